@@ -1,0 +1,90 @@
+"""Model expressions as a person writes them: ``lambert + 2*ggx(aniso, dielectric)``."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from dataclasses import dataclass
+
+OPTIONS: dict[str, tuple[str, object]] = {
+    "iso": ("anisotropic", False),
+    "aniso": ("anisotropic", True),
+    "schlick": ("fresnel", "schlick"),
+    "dielectric": ("fresnel", "dielectric"),
+}
+
+_TERM = re.compile(
+    r"\s*(?:(?P<count>\d+)\s*\*\s*)?(?P<name>[a-z][a-z0-9_]*)\s*"
+    r"(?:\((?P<options>[^()]*)\))?\s*"
+)
+
+
+class ModelError(ValueError):
+    """A model expression, parameter name, bound or tie that makes no sense."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """One lobe of an expression with the options written behind it."""
+
+    lobe: str
+    options: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.lobe}({', '.join(self.options)})" if self.options else self.lobe
+
+
+def parse(expression: str, known: tuple[str, ...]) -> tuple[Term, ...]:
+    """Terms of an expression, repeated as often as their factors say.
+
+    Raises `ModelError` that names the part that is wrong and the nearest known lobe.
+    """
+    terms: list[Term] = []
+    for part in expression.split("+"):
+        match = _TERM.fullmatch(part)
+        if match is None:
+            raise ModelError(
+                f"model {expression!r}: {part.strip() or 'an empty term'!r} is no lobe; "
+                "write for instance 'lambert + ggx' or 'lambert + 2*ggx(aniso)'"
+            )
+        name = match["name"]
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known)}"
+            raise ModelError(f"model {expression!r}: there is no lobe {name!r}; {hint}")
+        count = int(match["count"] or 1)
+        if not 1 <= count <= 8:
+            raise ModelError(f"model {expression!r}: {count} lobes {name!r}; use 1 to 8")
+        options = tuple(o.strip() for o in (match["options"] or "").split(",") if o.strip())
+        for option in options:
+            if option not in OPTIONS:
+                raise ModelError(
+                    f"model {expression!r}: lobe {name!r} has no option {option!r}; "
+                    f"options: {', '.join(OPTIONS)}"
+                )
+        terms += [Term(name, options)] * count
+    return tuple(terms)
+
+
+def canonical(terms: tuple[Term, ...]) -> str:
+    """The expression in one spelling: equal neighbours counted, blanks normalised."""
+    parts: list[str] = []
+    i = 0
+    while i < len(terms):
+        j = i
+        while j < len(terms) and terms[j] == terms[i]:
+            j += 1
+        parts.append(f"{j - i}*{terms[i]}" if j - i > 1 else str(terms[i]))
+        i = j
+    return " + ".join(parts)
+
+
+def lobe_labels(terms: tuple[Term, ...]) -> tuple[str, ...]:
+    """A name for each lobe: ``ggx`` if it is alone, else ``ggx1, ggx2`` in order."""
+    names = [t.lobe for t in terms]
+    seen: dict[str, int] = {}
+    labels: list[str] = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        labels.append(f"{name}{seen[name]}" if names.count(name) > 1 else name)
+    return tuple(labels)

@@ -1,0 +1,92 @@
+"""Directions as the models need them: components, computed once, never angles.
+
+``wi`` points from the surface to the source, ``wo`` to the detector, z is the normal.
+Half vectors are formed here in float64 and stored, because ``sin^2(theta_h)`` taken from
+``1 - cos^2`` loses every digit of a narrow peak in float32.
+"""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from numpy.typing import ArrayLike
+
+Vector = Float[Array, " n"]
+
+
+class Geometry(eqx.Module):
+    """Pairs of directions, structure of arrays; every field has the same shape.
+
+    ``cos_i, cos_o`` are the z components; ``hx, hy, hz`` the unit half vector
+    ``(wi + wo) / |wi + wo|``; ``cos_d = wi . wh``. At ``wi = -wo`` the half vector is not
+    defined and is taken as the normal with ``cos_d = 0``; every lobe is zero there.
+    """
+
+    wix: Vector
+    wiy: Vector
+    cos_i: Vector
+    wox: Vector
+    woy: Vector
+    cos_o: Vector
+    hx: Vector
+    hy: Vector
+    hz: Vector
+    cos_d: Vector
+
+    @property
+    def swapped(self) -> Geometry:
+        """The same pairs with source and detector exchanged."""
+        return Geometry(
+            wix=self.wox, wiy=self.woy, cos_i=self.cos_o,
+            wox=self.wix, woy=self.wiy, cos_o=self.cos_i,
+            hx=self.hx, hy=self.hy, hz=self.hz, cos_d=self.cos_d,
+        )  # fmt: skip
+
+    @property
+    def reflects(self) -> Array:
+        """True where source and detector are both on the side of the normal."""
+        return (self.cos_i >= 0) & (self.cos_o >= 0) & (self.cos_i + self.cos_o > 0)
+
+
+def from_components(wix, wiy, wiz, wox, woy, woz) -> Geometry:
+    """Geometry of unit vectors given by components; works on numpy and JAX arrays.
+
+    Differentiable in the directions everywhere but at ``wi = -wo``, where the gradient
+    is zero.
+    """
+    lib = np if all(isinstance(a, np.ndarray) for a in (wix, wiz, wox, woz)) else jnp
+    sx, sy, sz = wix + wox, wiy + woy, wiz + woz
+    norm2 = sx * sx + sy * sy + sz * sz
+    defined = norm2 > 1e-24
+    norm = lib.sqrt(lib.where(defined, norm2, 1.0))
+    return Geometry(
+        wix=wix, wiy=wiy, cos_i=wiz, wox=wox, woy=woy, cos_o=woz,
+        hx=lib.where(defined, sx / norm, 0.0),
+        hy=lib.where(defined, sy / norm, 0.0),
+        hz=lib.where(defined, sz / norm, 1.0),
+        cos_d=lib.where(defined, 0.5 * norm, 0.0),
+    )  # fmt: skip
+
+
+def from_angles(
+    theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike
+) -> Geometry:
+    """Geometry of polar and azimuthal angles in radians, in float64 (numpy arrays).
+
+    ``theta`` is measured from the normal, in [0, pi]; specular is ``phi_r - phi_i = pi``.
+    """
+    ti, pi, tr, pr = np.broadcast_arrays(
+        *(np.asarray(a, dtype=np.float64) for a in (theta_i, phi_i, theta_r, phi_r))
+    )
+    return from_components(
+        np.sin(ti) * np.cos(pi), np.sin(ti) * np.sin(pi), _cos(ti),
+        np.sin(tr) * np.cos(pr), np.sin(tr) * np.sin(pr), _cos(tr),
+    )  # fmt: skip
+
+
+def _cos(theta: np.ndarray) -> np.ndarray:
+    # np.cos(np.pi / 2) is 6e-17, not 0: a grazing direction is on the horizon, not above.
+    cosine = np.cos(theta)
+    return np.where(np.abs(cosine) < 1e-15, 0.0, cosine)

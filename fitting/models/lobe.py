@@ -1,0 +1,64 @@
+"""The contract of a lobe, which every file of this folder fulfils."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from fitting.geometry import Geometry
+from fitting.parameters import Parameter
+
+Shape = Mapping[str, Float[Array, ""]]
+
+
+class SlopeWidths(NamedTuple):
+    """Where a lobe that peaks around the half vector is wide, in slope space."""
+
+    alpha_x: Float[Array, ""]
+    alpha_y: Float[Array, ""]
+    angle: Float[Array, ""]
+
+
+class Lobe(eqx.Module):
+    """One term of a model: ``f = sum_j amplitude_j(coefficients, shape) basis_j(shape)``.
+
+    A lobe knows its parameters and its basis functions of the geometry. It knows nothing
+    of files, objectives or solvers. Its fields are options (static), never parameters.
+
+    - ``NAME``: how users write it in a model expression.
+    - ``REFERENCE``: the paper, to the equation number.
+    - ``RECIPROCAL``: whether ``f(wi, wo) = f(wo, wi)`` for all parameters.
+    - ``ALBEDO_BOUND``: an upper bound of the directional albedo with the largest
+      coefficient at 1, or None where there is none.
+    """
+
+    NAME: ClassVar[str]
+    REFERENCE: ClassVar[str]
+    RECIPROCAL: ClassVar[bool]
+    ALBEDO_BOUND: ClassVar[float | None]
+
+    @abc.abstractmethod
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The parameters, shape parameters and coefficients, in the order of printing."""
+
+    @abc.abstractmethod
+    def basis(self, shape: Shape, geometry: Geometry) -> tuple[Array, ...]:
+        """The basis functions, 1/sr, each of the shape of the geometry's arrays.
+
+        Finite, with finite derivatives, over the whole closed domain; zero where the
+        source or the detector is below the horizon.
+        """
+
+    @abc.abstractmethod
+    def amplitudes(
+        self, shape: Shape, coefficients: tuple[Array, ...]
+    ) -> tuple[Array, ...]:
+        """One factor per basis function, from the coefficients (each ``(c,)``)."""
+
+    @abc.abstractmethod
+    def slope_widths(self, shape: Shape) -> SlopeWidths | None:
+        """Widths for the half-vector quadrature, or None for a broad, smooth lobe."""

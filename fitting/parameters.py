@@ -1,0 +1,103 @@
+"""What a parameter is, and the smooth map between its support and the real line."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+Scale = Literal["log", "linear", "periodic"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a lobe, declared once.
+
+    A *coefficient* multiplies a basis function, is linear, and has one value per channel.
+    A *shape* parameter enters nonlinearly and is shared by all channels unless asked
+    otherwise. ``support`` is the closed interval of meaningful values; ``start`` the
+    interval from which starting values are taken. ``scale`` tells how a shape parameter
+    is spread over its support: ``log``, ``linear``, or ``periodic`` (then ``support`` is
+    one period and there is no bound).
+    """
+
+    name: str
+    default: float
+    support: tuple[float, float]
+    unit: str
+    meaning: str
+    coefficient: bool = False
+    scale: Scale = "linear"
+    start: tuple[float, float] = (math.nan, math.nan)
+
+    def bounded(self, lower: float, upper: float) -> Parameter:
+        """The same parameter on a narrower support."""
+        low, high = max(lower, self.support[0]), min(upper, self.support[1])
+        start = self.start
+        if not self.coefficient:
+            start = (min(max(start[0], low), high), min(max(start[1], low), high))
+        default = min(max(self.default, low), high)
+        return dataclasses.replace(
+            self, support=(low, high), start=start, default=default
+        )
+
+
+def shape(
+    name: str,
+    default: float,
+    support: tuple[float, float],
+    meaning: str,
+    *,
+    unit: str = "1",
+    scale: Scale = "log",
+    start: tuple[float, float] | None = None,
+) -> Parameter:
+    """Declare a shape parameter."""
+    return Parameter(
+        name, default, support, unit, meaning, scale=scale, start=start or support
+    )
+
+
+def coefficient(
+    name: str,
+    default: float,
+    meaning: str,
+    *,
+    support: tuple[float, float] = (0.0, math.inf),
+    unit: str = "1",
+) -> Parameter:
+    """Declare a coefficient: linear, one value per channel."""
+    return Parameter(name, default, support, unit, meaning, coefficient=True)
+
+
+def to_value(
+    scale: Scale, u: Float[Array, ""], lower: Float[Array, ""], upper: Float[Array, ""]
+) -> Float[Array, ""]:
+    """Value in the support for a point ``u`` of the real line.
+
+    ``linear``: ``lower + (upper - lower) sigmoid(u)``; ``log``: the same in the logarithm;
+    ``periodic``: ``u`` itself.
+    """
+    if scale == "periodic":
+        return u
+    share = jax.nn.sigmoid(u)
+    if scale == "log":
+        return lower * jnp.exp(jnp.log(upper / lower) * share)
+    return lower + (upper - lower) * share
+
+
+def to_real_line(scale: Scale, value: float, lower: float, upper: float) -> float:
+    """Inverse of `to_value`; a value at a bound is moved 1e-6 of the support inside."""
+    if scale == "periodic":
+        return value
+    if scale == "log":
+        share = math.log(value / lower) / math.log(upper / lower)
+    else:
+        share = (value - lower) / (upper - lower)
+    share = min(max(share, 1e-6), 1 - 1e-6)
+    return math.log(share / (1 - share))
