@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike
 
@@ -46,6 +47,19 @@ class Model(eqx.Module):
     def defaults(self) -> dict[str, float]:
         """Default value of every parameter."""
         return {name: p.default for name, p in self.parameters().items()}
+
+    @property
+    def anisotropic(self) -> bool:
+        """Whether a lobe depends on the azimuth of the sample itself."""
+        return any(n.endswith(".angle") for n in self.parameters())
+
+    def n_basis(self, index: int) -> int:
+        """Number of basis functions of one lobe."""
+        lobe = self.lobes[index]
+        shape = {p.name: 0.5 for p in lobe.parameters() if not p.coefficient}
+        dot = jax.ShapeDtypeStruct((1,), jnp.float32)
+        geometry = Geometry(*[dot] * len(Geometry.__dataclass_fields__))
+        return len(jax.eval_shape(lobe.basis, shape, geometry))
 
     def of_lobe(self, index: int, values: Mapping[str, Array]) -> dict[str, Array]:
         """The values of one lobe under their short names."""

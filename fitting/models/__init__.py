@@ -11,7 +11,12 @@ __all__ = ["LOBES", "Lobe", "Shape", "SlopeWidths", "lobe_class"]
 
 LOBES: dict[str, str] = {
     "lambert": "Lambert",
+    "oren_nayar": "OrenNayar",
+    "eon": "EON",
     "ggx": "GGX",
+    "beckmann": "Beckmann",
+    "ward": "Ward",
+    "blinn_phong": "BlinnPhong",
 }
 
 

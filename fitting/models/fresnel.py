@@ -36,7 +36,8 @@ def split(kind: Fresnel, shape: Shape, value: Array, cos_d: Array) -> tuple[Arra
     ``q = (1 - cos_d)^5``, linear in both.
     """
     if kind == "schlick":
-        q = (1.0 - cos_d) ** 5
+        # At retro-reflection a rounded cos_d may exceed 1 and q would be negative.
+        q = jnp.maximum(1.0 - cos_d, 0.0) ** 5
         return value * (1.0 - q), value * q
     return (value * dielectric(cos_d, shape["eta"]),)
 
@@ -44,13 +45,18 @@ def split(kind: Fresnel, shape: Shape, value: Array, cos_d: Array) -> tuple[Arra
 def dielectric(cos_d: Array, eta: Array) -> Array:
     """Unpolarised reflectance of a smooth dielectric interface, from below or above.
 
-    ``F = (rs^2 + rp^2) / 2`` with ``ct^2 = 1 - (1 - cos_d^2) / eta^2``. Total internal
+    ``F = (1/2) ((g - c) / (g + c))^2 (1 + ((c (g + c) - 1) / (c (g - c) + 1))^2)``,
+    ``g^2 = eta^2 - 1 + c^2`` (Cook and Torrance 1982), with ``g - c`` written as
+    ``(eta^2 - 1) / (g + c)`` so that no digit is lost as ``eta`` goes to 1. Total internal
     reflection gives 1 with zero derivative (the root is taken of 1 there, so that no
     infinite derivative is multiplied by zero).
     """
-    ct2 = 1.0 - (1.0 - cos_d) * (1.0 + cos_d) / eta**2
-    total = ct2 <= 0.0
-    ct = jnp.sqrt(jnp.where(total, 1.0, ct2))
-    rs = (cos_d - eta * ct) / (cos_d + eta * ct)
-    rp = (eta * cos_d - ct) / (eta * cos_d + ct)
-    return jnp.where(total, 1.0, 0.5 * (rs * rs + rp * rp))
+    step = (eta - 1.0) * (eta + 1.0)
+    g2 = step + cos_d * cos_d
+    total = g2 <= 0.0
+    g = jnp.sqrt(jnp.where(total, 1.0, g2))
+    both = jnp.where(total, 1.0, g + cos_d)
+    less = step / both
+    rs = less / both
+    rp_rs = (cos_d * both - 1.0) / jnp.where(total, 1.0, cos_d * less + 1.0)
+    return jnp.where(total, 1.0, 0.5 * rs * rs * (1.0 + rp_rs * rp_rs))

@@ -22,8 +22,14 @@ def width_parameters(anisotropic: bool) -> tuple[Parameter, ...]:
             shape("alpha", 0.2, ALPHA_SUPPORT, "microfacet slope width", start=(0.01, 1.0)),
         )
     return (
-        shape("alpha_x", 0.2, ALPHA_SUPPORT, "slope width along the tangent", start=(0.02, 0.8)),
-        shape("alpha_y", 0.3, ALPHA_SUPPORT, "slope width across the tangent", start=(0.02, 0.8)),
+        shape(
+            "alpha_x", 0.2, ALPHA_SUPPORT, "slope width along the tangent",
+            start=(0.02, 0.8),
+        ),
+        shape(
+            "alpha_y", 0.3, ALPHA_SUPPORT, "slope width across the tangent",
+            start=(0.02, 0.8),
+        ),
         shape(
             "angle", 0.4, (0.0, math.pi), "azimuth of the tangent",
             unit="rad", scale="periodic", start=(0.0, math.pi),
@@ -55,9 +61,11 @@ class Stretched(NamedTuple):
 def stretched(parameters: Shape, g: Geometry) -> Stretched:
     """Half vector and directions in the frame where the distribution is round."""
     if "alpha" in parameters:
-        a2 = parameters["alpha"] ** 2
+        alpha = parameters["alpha"]
+        a2 = alpha**2
+        # Not divided by alpha^2: the derivative would pass through alpha^-4, and overflow.
         return Stretched(
-            (g.hx**2 + g.hy**2) / a2,
+            (g.hx / alpha) ** 2 + (g.hy / alpha) ** 2,
             (g.wix**2 + g.wiy**2) * a2,
             (g.wox**2 + g.woy**2) * a2,
             a2,

@@ -1,0 +1,172 @@
+"""Directional albedo ``E(wo) = int f(wi, wo) cos_i dwi`` of lobes and of models.
+
+By reciprocity the detector may be read as the source. The nodes are fixed in number and
+move smoothly with the widths of the lobe, so that the albedo can be differentiated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from fitting.geometry import Geometry, from_components
+from fitting.model import Model
+from fitting.models import Lobe, Shape, SlopeWidths
+
+NODES = 16
+
+
+def albedo_basis(
+    lobe: Lobe,
+    shape: Shape,
+    cos_theta: Float[ArrayLike, " k"],
+    *,
+    azimuth: ArrayLike = 0.0,
+    nodes: int = NODES,
+) -> tuple[Float[Array, " k"], ...]:
+    """Directional albedo of each basis function of a lobe.
+
+    ``cos_theta`` are the cosines of the detector's polar angles in [0, 1], ``azimuth`` its
+    azimuth in radians. ``nodes`` is the number per dimension. A lobe with slope widths is
+    integrated over the half vector, up to the exact horizon: with 16 nodes the error is
+    below 1e-3 for every width at ``cos_theta >= 0.1`` and falls fast for wide lobes;
+    other lobes are integrated over the source direction. In float64 if JAX has it enabled.
+    """
+    dtype = jnp.result_type(float)
+    mu = jnp.asarray(cos_theta, dtype)[:, None, None]
+    azimuth = jnp.asarray(azimuth, dtype)
+    shape = {n: jnp.asarray(v) for n, v in shape.items()}
+    widths = lobe.slope_widths(shape)
+    if widths is None:
+        geometry, weight = _over_source(mu, azimuth, nodes)
+    elif widths.alpha_x is widths.alpha_y:
+        geometry, weight = _over_half_vector(mu, jnp.zeros_like(azimuth), widths, nodes)
+    else:
+        geometry, weight = _over_half_vector(mu, azimuth, widths, nodes, full_circle=True)
+    return tuple(jnp.sum(b * weight, (1, 2)) for b in lobe.basis(shape, geometry))
+
+
+def model_albedo(
+    model: Model,
+    parameters: Mapping[str, ArrayLike],
+    cos_theta: Float[ArrayLike, " k"],
+    *,
+    azimuth: ArrayLike = 0.0,
+    nodes: int = NODES,
+) -> Float[Array, "k c"]:
+    """Directional albedo of a model per channel; one channel if all values are scalars.
+
+    ``parameters`` maps all full names, such as ``"ggx.alpha"``, to values. See
+    `albedo_basis` for the other arguments.
+    """
+    values = {n: jnp.asarray(v) for n, v in parameters.items()}
+    known = model.parameters()
+    shape = {n: v for n, v in values.items() if not known[n].coefficient}
+    linear = {n: v for n, v in values.items() if known[n].coefficient}
+    basis = [
+        b
+        for i, lobe in enumerate(model.lobes)
+        for b in albedo_basis(
+            lobe, model.of_lobe(i, shape), cos_theta, azimuth=azimuth, nodes=nodes
+        )
+    ]
+    terms = [
+        b[:, None] * jnp.atleast_1d(a)
+        for b, a in zip(basis, model.amplitudes(shape, linear), strict=True)
+    ]
+    return sum(terms[1:], terms[0])
+
+
+def _detector(mu: Array, azimuth: Array) -> tuple[Array, Array]:
+    sine = jnp.sqrt((1.0 - mu) * (1.0 + mu))
+    return sine * jnp.cos(azimuth), sine * jnp.sin(azimuth)
+
+
+def _unit_nodes(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss-Legendre nodes and weights on [0, 1]."""
+    x, w = np.polynomial.legendre.leggauss(count)
+    return 0.5 * (x + 1.0), 0.5 * w
+
+
+def _over_half_vector(
+    mu: Array,
+    azimuth: Array,
+    widths: SlopeWidths,
+    nodes: int,
+    *,
+    full_circle: bool = False,
+) -> tuple[Geometry, Array]:
+    """Nodes ``(k, nodes, azimuths)`` of the half vector, and ``cos_i dwi`` at each.
+
+    Slopes are ``r (alpha_x cos(phi), alpha_y sin(phi))`` in the tangent frame with
+    ``r = tan v``, Gauss-Legendre nodes in ``v`` and midpoints in ``phi``. The measure is
+    ``dwi = 4 cos_d dwh``, ``dwh = cos^3(theta_h) alpha_x alpha_y r dr dphi``. The source is
+    on the horizon where ``tan(theta_h) = (R + p) / cos_o`` with ``p`` the component of wo
+    along the azimuth of the half vector and ``R^2 = p^2 + cos_o^2``. Where the lobe is
+    round, half a circle from the detector's azimuth stands for both.
+    """
+    dtype = mu.dtype
+    x_o, y_o = _detector(mu, azimuth)
+    ax, ay, angle = widths
+    ca, sa = jnp.cos(angle), jnp.sin(angle)
+    count = 2 * nodes if full_circle else nodes
+    span = 2.0 * np.pi if full_circle else np.pi
+    phi = span * (np.arange(count) + 0.5) / count
+    ux = ax * jnp.asarray(np.cos(phi), dtype)
+    uy = ay * jnp.asarray(np.sin(phi), dtype)
+    rho = jnp.sqrt(ux * ux + uy * uy)
+    px, py = (ca * ux - sa * uy) / rho, (sa * ux + ca * uy) / rho
+
+    p = x_o * px + y_o * py
+    r2 = p * p + mu * mu
+    big = jnp.sqrt(jnp.where(r2 > 0, r2, 1.0)) + jnp.abs(p)
+    # (R + p) (R - p) = cos_o^2: the form without cancellation on either side.
+    top = jnp.where(p > 0, big, mu)
+    bottom = jnp.where(p > 0, mu, big)
+    v_max = jnp.arctan2(top, rho * bottom)
+
+    x, w = _unit_nodes(nodes)
+    r = jnp.tan(v_max * jnp.asarray(x, dtype)[:, None])
+    dr = (1.0 + r * r) * v_max * jnp.asarray(w, dtype)[:, None]
+    slope = r * rho
+    hz = 1.0 / jnp.sqrt(1.0 + slope * slope)
+    hx, hy = slope * hz * px, slope * hz * py
+    cos_d = x_o * hx + y_o * hy + mu * hz
+    geometry = Geometry(
+        wix=2.0 * cos_d * hx - x_o,
+        wiy=2.0 * cos_d * hy - y_o,
+        cos_i=2.0 * cos_d * hz - mu,
+        wox=x_o, woy=y_o, cos_o=mu,
+        hx=hx, hy=hy, hz=hz, cos_d=cos_d,
+    )  # fmt: skip
+    dwh = hz * hz * hz * (ax * ay) * r * dr * (2.0 * np.pi / count)
+    return geometry, geometry.cos_i * 4.0 * cos_d * dwh
+
+
+def _over_source(mu: Array, azimuth: Array, nodes: int) -> tuple[Geometry, Array]:
+    """Nodes ``(k, polar, azimuths)`` of the source, and ``cos_i dwi`` at each.
+
+    Gauss-Legendre in the polar angle and the azimuth, in panels that end at the detector's
+    polar angle and at quarter turns from it, where diffuse lobes have their kinks.
+    """
+    dtype = mu.dtype
+    x_o, y_o = _detector(mu, azimuth)
+    x, w = _unit_nodes(max(nodes // 2, 1))
+    x, w = jnp.asarray(x, dtype)[:, None], jnp.asarray(w, dtype)[:, None]
+    middle = jnp.arccos(mu)
+    rest = 0.5 * np.pi - middle
+    theta = jnp.concatenate([middle * x, middle + rest * x], axis=1)
+    dtheta = jnp.concatenate([middle * w, rest * w], axis=1)
+
+    x, w = _unit_nodes(max(nodes // 4, 1))
+    phi = jnp.asarray(0.5 * np.pi * (np.arange(4)[:, None] + x).ravel(), dtype)
+    dphi = jnp.asarray(0.5 * np.pi * np.tile(w, 4), dtype)
+    sine, cosine = jnp.sin(theta), jnp.cos(theta)
+    geometry = from_components(
+        sine * jnp.cos(phi + azimuth), sine * jnp.sin(phi + azimuth), cosine,
+        x_o, y_o, mu,
+    )  # fmt: skip
+    return geometry, cosine * sine * dtheta * dphi

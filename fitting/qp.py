@@ -1,0 +1,159 @@
+"""Many small convex quadratic programs at once, one per channel.
+
+The coefficients of a channel (a handful) minimise a quadratic under bounds and, on
+request, the energy polytope. An interior-point method needs no branching, so all channels
+run together; and its last matrix is the inverse Hessian restricted to the free directions,
+which is what the elimination of the coefficients needs next.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+_RIDGE = 1e-14
+_MAX_STIFFNESS = 1e10
+_TOLERANCE = 1e-15
+_MAX_STEPS = 40
+
+
+class QPSolution(NamedTuple):
+    """Minimiser, inverse of the Hessian on the free directions, and active constraints."""
+
+    x: Float[Array, "c m"]
+    inverse: Float[Array, "c m m"]
+    active: Bool[Array, "c p"]
+
+
+def inverse(matrix: Float[Array, "*b m m"]) -> Float[Array, "*b m m"]:
+    """Inverse of symmetric positive definite matrices by the sweep operator.
+
+    One rank-one update per row (Goodnight 1979, The American Statistician 33, 149):
+    elementwise over the batch, a few fused operations per row, quick to compile. Pivots
+    are kept above `_RIDGE` times the diagonal, which makes a singular matrix usable in
+    the directions that the data determine.
+    """
+    m = matrix.shape[-1]
+    floor = _RIDGE * jnp.abs(jnp.diagonal(matrix, axis1=-2, axis2=-1)) + 1e-300
+
+    def sweep(i: Array, a: Array) -> Array:
+        here = jnp.arange(m) == i
+        row = jnp.sum(jnp.where(here[:, None], a, 0.0), axis=-2)
+        pivot = jnp.sum(jnp.where(here, row, 0.0), axis=-1)
+        pivot = jnp.maximum(pivot, jnp.sum(jnp.where(here, floor, 0.0), axis=-1))
+        row = jnp.where(here, -1.0, row) / pivot[..., None]
+        column = jnp.where(here, -1.0, row * pivot[..., None])
+        rest = jnp.where(here[:, None] | here, 0.0, a)
+        return rest - column[..., :, None] * row[..., None, :]
+
+    swept = jax.lax.fori_loop(0, m, sweep, matrix)
+    return -swept
+
+
+def product(matrix: Float[Array, "*b m k"], x: Float[Array, "*b k"]) -> Array:
+    """Matrix times vector over the batch, as a fused sum instead of many small GEMMs."""
+    return jnp.sum(matrix * x[..., None, :], axis=-1)
+
+
+def solve(
+    hessian: Float[Array, "c m m"],
+    linear: Float[Array, "c m"],
+    rows: Float[Array, "p m"],
+    limits: Float[Array, "c p"],
+) -> QPSolution:
+    """Minimise ``x' H x / 2 - b' x`` subject to ``rows x >= limits``, for every channel.
+
+    Mehrotra's predictor-corrector method (Nocedal and Wright, Numerical Optimization,
+    alg. 16.4) on the problem scaled to a unit diagonal. A coefficient whose constraint
+    ends up active is put exactly on it where the constraint is a bound.
+    """
+    diagonal = jnp.einsum("cii->ci", hessian)
+    d = jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
+    g = hessian / (d[:, :, None] * d[:, None, :])
+    m = g.shape[-1]
+    g = g + _RIDGE * jnp.eye(m, dtype=g.dtype)
+    b = linear / d
+    size = jnp.maximum(jnp.max(jnp.abs(b), axis=1, keepdims=True), 1e-300)
+    b = b / size
+    if rows.shape[0] == 0:
+        full = inverse(g)
+        x = product(full, b)
+        none = jnp.zeros((g.shape[0], 0), dtype=bool)
+        return QPSolution(
+            x * size / d, full / (d[:, :, None] * d[:, None, :]), none
+        )
+
+    scaled = rows[None] / d[:, None, :]
+    norm = jnp.linalg.norm(scaled, axis=-1)
+    a = scaled / norm[..., None]
+    h = limits / (norm * size)
+
+    def products(x: Array) -> Array:
+        return product(a, x)
+
+    def gram(weight: Array) -> Array:
+        stiff = weight[:, :, None, None] * a[:, :, :, None] * a[:, :, None, :]
+        return jnp.sum(stiff, axis=1)
+
+    def transposed(z: Array) -> Array:
+        return jnp.sum(a * z[:, :, None], axis=1)
+
+    def step_length(v: Array, dv: Array) -> Array:
+        ratio = jnp.where(dv < 0, -v / jnp.where(dv < 0, dv, -1.0), jnp.inf)
+        return jnp.minimum(1.0, jnp.min(ratio, axis=1, keepdims=True))
+
+    def body(carry):
+        x, s, z, steps, _ = carry
+        dual = product(g, x) - b - transposed(z)
+        primal = products(x) - h - s
+        mu = jnp.mean(s * z, axis=1, keepdims=True)
+        newton = inverse(g + gram(z / s))
+
+        def direction(target: Array) -> tuple[Array, Array, Array]:
+            dx = product(newton, transposed((target - z * primal) / s) - dual)
+            ds = products(dx) + primal
+            return dx, ds, (target - z * ds) / s
+
+        _, ds, dz = direction(-s * z)
+        reach_s, reach_z = step_length(s, ds), step_length(z, dz)
+        mu_ahead = jnp.mean((s + reach_s * ds) * (z + reach_z * dz), axis=1, keepdims=True)
+        centring = (mu_ahead / mu) ** 3
+        dx, ds, dz = direction(centring * mu - s * z - ds * dz)
+        reach = 0.995 * jnp.minimum(step_length(s, ds), step_length(z, dz))
+        x, s, z = x + reach * dx, s + reach * ds, z + reach * dz
+        s, z = jnp.maximum(s, 1e-30), jnp.maximum(z, 1e-30)
+        gap = jnp.mean(s * z, axis=1) + jnp.max(jnp.abs(reach * dx), axis=1) ** 2 * 1e-2
+        return x, s, z, steps + 1, jnp.max(gap)
+
+    def unfinished(carry):
+        *_, steps, gap = carry
+        return (steps < _MAX_STEPS) & (gap > _TOLERANCE)
+
+    x0 = jnp.zeros_like(b)
+    s0 = jnp.maximum(products(x0) - h, 1.0)
+    z0 = jnp.ones_like(s0)
+    gap0 = jnp.full((), jnp.inf, dtype=b.dtype)
+    x, s, z, _, _ = jax.lax.while_loop(unfinished, body, (x0, s0, z0, 0, gap0))
+
+    stiffness = jnp.minimum(z / s, _MAX_STIFFNESS)
+    free = inverse(g + gram(stiffness))
+    active = z > s
+    x = x * size / d
+    return QPSolution(
+        _put_on_bounds(x, rows, limits, active),
+        free / (d[:, :, None] * d[:, None, :]),
+        active,
+    )
+
+
+def _put_on_bounds(x: Array, rows: Array, limits: Array, active: Array) -> Array:
+    is_bound = jnp.sum(rows != 0, axis=1) == 1
+    which = (rows != 0) & is_bound[:, None]
+    value = limits[:, :, None] / jnp.where(which, rows, 1.0)[None]
+    on = active[:, :, None] & which[None]
+    count = jnp.sum(on, axis=1)
+    target = jnp.sum(jnp.where(on, value, 0.0), axis=1) / jnp.maximum(count, 1)
+    return jnp.where(count > 0, target, x)

@@ -1,0 +1,335 @@
+"""The heart of the fit: one pass over the data for everything that a step needs.
+
+The model is ``f = sum_j a_j(x, u) B_j(u)`` with a handful of shape unknowns ``u`` shared by
+all channels and, per channel, coefficients ``x`` that enter (nearly) linearly. The
+Gauss-Newton matrix is therefore an arrow. It is accumulated from products of *features*,
+the basis functions and their derivatives, which do not depend on the channel: memory is
+that of the data, whatever the number of wavelengths, and the Jacobian (rows times channels
+by parameters) is never formed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from fitting import albedo, objectives, qp
+from fitting.geometry import Geometry
+from fitting.model import Model
+from fitting.parameters import Scale, to_value
+
+# Where the penalty looks at the directional albedo: Gauss-Legendre nodes in the cosine,
+# which reach the grazing directions, where Schlick lobes break the limit first.
+ENERGY_COSINES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(8)[0]
+ENERGY_NODES = 16
+
+
+class Unknowns(eqx.Module):
+    """How the free unknowns make the parameters: what is fixed, tied and bounded.
+
+    Parameter ``p`` is ``factor * free[index] + constant``; ``index`` is -1 if it is fixed.
+    """
+
+    shape_names: tuple[str, ...] = eqx.field(static=True)
+    shape_source: tuple[tuple[int, float], ...] = eqx.field(static=True)
+    scales: tuple[Scale, ...] = eqx.field(static=True)
+    coefficient_names: tuple[str, ...] = eqx.field(static=True)
+    coefficient_source: tuple[tuple[int, float], ...] = eqx.field(static=True)
+    n_coefficients: int = eqx.field(static=True)
+    shape_constant: Float[Array, " s"]
+    lower: Float[Array, " k"]
+    upper: Float[Array, " k"]
+    coefficient_constant: Float[Array, "q c"]
+    rows: Float[Array, "p m"]
+    limits: Float[Array, "c p"]
+
+    @property
+    def n_shape(self) -> int:
+        """Number of free shape unknowns."""
+        return len(self.scales)
+
+    def shape(self, u: Float[Array, " k"]) -> dict[str, Array]:
+        """All shape parameters by name."""
+        free = [
+            to_value(scale, u[i], self.lower[i], self.upper[i])
+            for i, scale in enumerate(self.scales)
+        ]
+        return {
+            name: factor * free[index] if index >= 0 else self.shape_constant[i]
+            for i, (name, (index, factor)) in enumerate(
+                zip(self.shape_names, self.shape_source, strict=True)
+            )
+        }
+
+    def coefficients(self, x: Float[Array, " m"], c: Float[Array, " q"]) -> dict:
+        """All coefficients of one channel, whose constants are ``c``."""
+        return {
+            name: factor * x[index] if index >= 0 else c[i]
+            for i, (name, (index, factor)) in enumerate(
+                zip(self.coefficient_names, self.coefficient_source, strict=True)
+            )
+        }
+
+
+class Problem(eqx.Module):
+    """Everything that one fit needs, padded: rows with weight 0 count for nothing.
+
+    ``target`` is ``phi(y kappa)``; ``linear_target, linear_weight`` are the same residual
+    linearised at the data, from which starts are made. ``scale`` is the sum of squares of
+    the weighted target, to which costs and penalties are compared.
+    """
+
+    model: Model
+    unknowns: Unknowns
+    objective: str = eqx.field(static=True)
+    robust: bool = eqx.field(static=True)
+    chunk: int = eqx.field(static=True)
+    penalised: bool = eqx.field(static=True)
+    geometry: Geometry
+    kappa: Float[Array, " n"]
+    weight: Float[Array, "w n"]
+    target: Float[Array, "c n"]
+    linear_target: Float[Array, "c n"]
+    linear_weight: Float[Array, "w n"]
+    robust_width: Float[Array, ""]
+    energy_weight: Float[Array, ""]
+    reciprocity_weight: Float[Array, ""]
+    scale: Float[Array, ""]
+    pairs: Geometry
+
+    @property
+    def resolves(self) -> bool:
+        """Whether the coefficients follow exactly from the shape (a quadratic problem)."""
+        return (
+            objectives.OBJECTIVES[self.objective].linear
+            and not self.robust
+            and not self.penalised
+            and all(lobe.NAME != "eon" for lobe in self.model.lobes)
+        )
+
+
+class Blocks(NamedTuple):
+    """Value, gradient and Gauss-Newton matrix of half the sum of squares at a point."""
+
+    x: Float[Array, "c m"]
+    cost: Float[Array, ""]
+    g_u: Float[Array, " k"]
+    g_x: Float[Array, "c m"]
+    h_uu: Float[Array, "k k"]
+    h_xu: Float[Array, "c m k"]
+    h_xx: Float[Array, "c m m"]
+
+
+def _dependents(problem: Problem) -> tuple[tuple[int, int], ...]:
+    """Pairs (basis function, shape unknown) where the one depends on the other."""
+    unknowns, model = problem.unknowns, problem.model
+    out: list[tuple[int, int]] = []
+    first = 0
+    for i, lobe in enumerate(model.lobes):
+        declared = {f"{model.labels[i]}.{p.name}" for p in lobe.parameters()}
+        own = {
+            index
+            for name, (index, _) in zip(
+                unknowns.shape_names, unknowns.shape_source, strict=True
+            )
+            if name in declared and index >= 0
+        }
+        count = model.n_basis(i)
+        out += [(first + j, k) for j in range(count) for k in sorted(own)]
+        first += count
+    return tuple(sorted(out, key=lambda jk: (jk[1], jk[0])))
+
+
+def _with_tangents(problem: Problem, functions, u: Array) -> Array:
+    """Functions of ``u`` (a tuple of arrays) and their needed derivatives, stacked."""
+    pairs = _dependents(problem)
+    value, derivatives = functions(u), {}
+    for k in range(problem.unknowns.n_shape):
+        unit = jnp.zeros_like(u).at[k].set(1.0)
+        value, derivatives[k] = jax.jvp(functions, (u,), (unit,))
+    return jnp.stack([*value, *(derivatives[k][j] for j, k in pairs)])
+
+
+def _features(problem: Problem, u: Array, geometry: Geometry) -> Array:
+    return _with_tangents(
+        problem,
+        lambda v: problem.model.basis(problem.unknowns.shape(v), geometry),
+        u,
+    )
+
+
+def _amplitudes(problem: Problem, u: Array, x: Array) -> tuple[Array, Array, Array]:
+    """``a (c, b)`` and its derivatives in ``x (c, b, m)`` and ``u (c, b, k)``."""
+
+    def of_channel(uc: tuple[Array, Array], constant: Array) -> Array:
+        values = problem.unknowns.coefficients(uc[1], constant)
+        shape = problem.unknowns.shape(uc[0])
+        out = problem.model.amplitudes(shape, values)
+        return jnp.stack([jnp.asarray(a, dtype=u.dtype) for a in out])
+
+    def one(xc: Array, constant: Array):
+        a = of_channel((u, xc), constant)
+        in_u, in_x = jax.jacfwd(of_channel)((u, xc), constant)
+        return a, in_x, in_u
+
+    return jax.vmap(one)(x, problem.unknowns.coefficient_constant.T)
+
+
+def _residual(problem: Problem, f: Array, rows, linearised: Array):
+    """Residual and its slope in ``f``, both ``(c, n)``."""
+    kappa, weight, target, linear_target, linear_weight = rows
+    v = f * kappa
+    r = weight * (objectives.transform(problem.objective, v) - target)
+    linear = objectives.OBJECTIVES[problem.objective].linear
+    if linear and not problem.robust:
+        return r, weight * kappa
+    d = weight * kappa * objectives.slope(problem.objective, v)
+    if problem.robust:
+        r, inner = objectives.pseudo_huber(r, problem.robust_width)
+        d = d * inner
+    r = jnp.where(linearised, linear_weight * (f - linear_target), r)
+    return r, jnp.where(linearised, linear_weight, d)
+
+
+def _accumulate(
+    problem: Problem, u: Array, a: Array, linearised: Array
+) -> tuple[Array, Array, Array]:
+    """Gram matrix of the features per channel, gradient in feature space, and cost."""
+    n_basis = a.shape[1]
+    n_rows = problem.kappa.shape[0]
+    blocks = n_rows // problem.chunk
+    n_features = n_basis + len(_dependents(problem))
+    upper = jnp.triu_indices(n_features)
+
+    def contract(features: Array, r: Array, d: Array):
+        products = features[upper[0]] * features[upper[1]]
+        return (d * d) @ products.T, (d * r) @ features.T, jnp.sum(r * r, axis=1)
+
+    def chunk(rows):
+        geometry, *data = rows
+        features = _features(problem, u, geometry)
+        f = a @ features[:n_basis]
+        return contract(features, *_residual(problem, f, data, linearised))
+
+    rows = (
+        problem.geometry,
+        problem.kappa,
+        problem.weight,
+        problem.target,
+        problem.linear_target,
+        problem.linear_weight,
+    )
+    if blocks == 1:
+        total = chunk(rows)
+    else:
+
+        def split(v: Array) -> Array:
+            parts = v.reshape(*v.shape[:-1], blocks, problem.chunk)
+            return jnp.moveaxis(parts, -2, 0)
+
+        def add(carry, part):
+            return jax.tree.map(jnp.add, carry, chunk(part)), None
+
+        chunks = jax.tree.map(split, rows)
+        zero = jax.tree.map(
+            lambda s: jnp.zeros(s.shape, s.dtype),
+            jax.eval_shape(chunk, jax.tree.map(lambda v: v[0], chunks)),
+        )
+        total, _ = jax.lax.scan(add, zero, chunks)
+    if problem.penalised:
+        for features, phi in _penalty_rows(problem, u):
+            r, d = phi(a @ features[:n_basis])
+            total = jax.tree.map(jnp.add, total, contract(features, r, d))
+    gram, gradient, cost = total
+    full = jnp.zeros((gram.shape[0], n_features, n_features), gram.dtype)
+    full = full.at[:, upper[0], upper[1]].set(gram)
+    full = full.at[:, upper[1], upper[0]].set(gram)
+    return full, gradient, jnp.sum(cost)
+
+
+def _penalty_rows(problem: Problem, u: Array):
+    """Features of the penalties and how their residual follows from them."""
+    model, unknowns = problem.model, problem.unknowns
+    cosines = jnp.asarray(ENERGY_COSINES, dtype=u.dtype)
+    azimuths = (0.0, 0.5 * math.pi) if model.anisotropic else (0.0,)
+
+    def energy(v: Array) -> tuple[Array, ...]:
+        shape = unknowns.shape(v)
+        return tuple(
+            jnp.concatenate(
+                [
+                    albedo.albedo_basis(
+                        lobe, model.of_lobe(i, shape), cosines,
+                        nodes=ENERGY_NODES, azimuth=azimuth,
+                    )[j]
+                    for azimuth in azimuths
+                ]
+            )
+            for i, lobe in enumerate(model.lobes)
+            for j in range(model.n_basis(i))
+        )  # fmt: skip
+
+    def hinge(total: Array) -> tuple[Array, Array]:
+        w = jnp.sqrt(problem.energy_weight / total.shape[1])
+        return w * jax.nn.relu(total - 1.0), w * (total > 1.0)
+
+    yield _with_tangents(problem, energy, u), hinge
+    if not all(lobe.RECIPROCAL for lobe in model.lobes):
+
+        def difference(v: Array) -> tuple[Array, ...]:
+            shape = unknowns.shape(v)
+            there = model.basis(shape, problem.pairs)
+            back = model.basis(shape, problem.pairs.swapped)
+            return tuple(f - b for f, b in zip(there, back, strict=True))
+
+        def plain(total: Array) -> tuple[Array, Array]:
+            w = jnp.sqrt(problem.reciprocity_weight / total.shape[1])
+            return w * total, w * jnp.ones_like(total)
+
+        yield _with_tangents(problem, difference, u), plain
+
+
+def evaluate(
+    problem: Problem, u: Array, x: Array, linearised: Bool[Array, ""]
+) -> Blocks:
+    """The blocks at ``(u, x)``; where the problem `resolves`, at the best ``x`` for ``u``."""
+    a, da_dx, da_du = _amplitudes(problem, u, x)
+    gram, gradient, cost = _accumulate(problem, u, a, linearised)
+    gram = jnp.broadcast_to(gram, (x.shape[0], *gram.shape[1:]))
+    n_basis, n_features = a.shape[1], gram.shape[1]
+    if problem.resolves and x.shape[1]:
+        to_x = jnp.pad(da_dx, ((0, 0), (0, n_features - n_basis), (0, 0)))
+        h = jnp.einsum("cfm,cfg,cgn->cmn", to_x, gram, to_x)
+        g = jnp.einsum("cfm,cf->cm", to_x, gradient)
+        unknowns = problem.unknowns
+        best = qp.solve(h, qp.product(h, x) - g, unknowns.rows, unknowns.limits).x
+        step = qp.product(to_x, best - x)
+        change = qp.product(gram, step)
+        cost = cost + jnp.sum((2.0 * gradient + change) * step)
+        gradient = gradient + change
+        x, a = best, a + step[:, :n_basis]
+    # Derivatives of the basis functions, weighted by their amplitudes, make the columns
+    # of the shape unknowns.
+    pairs = _dependents(problem)
+    to_u = jnp.zeros((a.shape[0], n_features, u.shape[0]), a.dtype)
+    to_u = to_u.at[:, :n_basis].set(da_du)
+    for t, (j, k) in enumerate(pairs):
+        to_u = to_u.at[:, n_basis + t, k].add(a[:, j])
+    to_x = jnp.pad(da_dx, ((0, 0), (0, n_features - n_basis), (0, 0)))
+    gram_x = jnp.einsum("cfg,cgm->cfm", gram, to_x)
+    gram_u = jnp.einsum("cfg,cgk->cfk", gram, to_u)
+    return Blocks(
+        x=x,
+        cost=jnp.maximum(cost, 0.0),
+        g_u=jnp.einsum("cfk,cf->k", to_u, gradient),
+        g_x=jnp.einsum("cfm,cf->cm", to_x, gradient),
+        h_uu=jnp.einsum("cfk,cfl->kl", to_u, gram_u),
+        h_xu=jnp.einsum("cfm,cfk->cmk", to_x, gram_u),
+        h_xx=jnp.einsum("cfm,cfn->cmn", to_x, gram_x),
+    )

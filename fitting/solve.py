@@ -1,0 +1,202 @@
+"""The solver: Levenberg-Marquardt on the arrow, driven by optimistix.
+
+optimistix runs the iteration and reports its outcome; what is ours is the step, which
+eliminates the coefficients of every channel exactly, under their bounds, and so has to
+deal with the few shared shape unknowns only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import equinox.internal as eqxi
+import jax
+import jax.numpy as jnp
+import optimistix as optx
+from jaxtyping import Array, Bool, Float, Int
+
+from fitting import qp, reduced
+from fitting.reduced import Blocks, Problem
+
+MAX_STEPS = 200
+_MAX_SHAPE_STEP = 1.5
+_FIRST_DAMPING = 1e-3
+
+
+class Solution(NamedTuple):
+    """Where a start ended: unknowns, half... cost, and how it got there."""
+
+    u: Float[Array, " k"]
+    x: Float[Array, "c m"]
+    cost: Float[Array, ""]
+    steps: Int[Array, ""]
+    converged: Bool[Array, ""]
+
+
+class _State(NamedTuple):
+    accepted: Any
+    at: tuple[Array, Array]
+    damping: Array
+    growth: Array
+    predicted: Array
+    started: Array
+    done: Array
+
+
+class ArrowLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
+    """Levenberg-Marquardt for problems whose function returns `Blocks`.
+
+    Damping is scaled by the diagonal (Marquardt) and updated by Nielsen's rule (Madsen,
+    Nielsen and Tingleff 2004, eq. 2.21). Stops when the decrease that the quadratic model
+    still promises is below ``rtol`` of the cost or ``atol``.
+    """
+
+    rtol: float = 1e-13
+    atol: float = 1e-28
+    norm: Callable = optx.max_norm
+
+    def init(self, fn, y, args, options, f_struct, aux_struct, tags):
+        del fn, args, options, aux_struct, tags
+        zero = jnp.zeros((), dtype=jnp.float64)
+        blocks = jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), f_struct)
+        no = jnp.asarray(False)
+        return _State(
+            blocks, y, zero + _FIRST_DAMPING, zero + 2.0, zero + jnp.inf, no, no
+        )
+
+    def step(self, fn, y, args, options, state, tags):
+        del options, tags
+        problem: Problem = args
+        new, aux = fn(y, args)
+        gain = (state.accepted.cost - new.cost) / state.predicted
+        finite = jnp.isfinite(new.cost)
+        accept = finite & (~state.started | (new.cost < state.accepted.cost))
+        shrink = jnp.maximum(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3)
+        damping = jnp.where(accept, state.damping * shrink, state.damping * state.growth)
+        damping = jnp.where(state.started, jnp.maximum(damping, 1e-14), state.damping)
+        growth = jnp.where(accept, 2.0, state.growth * 2.0)
+
+        def choose(a, b):
+            return jax.tree.map(lambda p, q: jnp.where(accept, p, q), a, b)
+
+        blocks = choose(new, state.accepted)
+        at = choose((y[0], new.x), state.at)
+        proposal, predicted = propose(problem, at, blocks, damping)
+        small = predicted <= self.rtol * blocks.cost + self.atol * problem.scale
+        stuck = damping > 1e12
+        done = (state.started | accept) & (small | stuck)
+        state = _State(
+            blocks, at, damping, growth, predicted, state.started | accept, done
+        )
+        return proposal, state, aux
+
+    def terminate(self, fn, y, args, options, state, tags):
+        del fn, y, args, options, tags
+        return state.done, optx.RESULTS.successful
+
+    def postprocess(self, fn, y, aux, args, options, state, tags, result):
+        del fn, y, args, options, tags, result
+        return state.at, aux, {"cost": state.accepted.cost}
+
+
+def propose(
+    problem: Problem, at: tuple[Array, Array], b: Blocks, damping: Array
+) -> tuple[tuple[Array, Array], Array]:
+    """Next point and the decrease of the cost that the quadratic model predicts for it."""
+    u, x = at
+    unknowns = problem.unknowns
+    m, k = x.shape[1], u.shape[0]
+    diagonal = jnp.einsum("cmm->cm", b.h_xx)
+    damped = b.h_xx + (damping * diagonal)[:, :, None] * jnp.eye(m, dtype=x.dtype)
+
+    def coefficients(step: Array) -> tuple[Array, Array]:
+        pull = qp.product(damped, x) - b.g_x
+        pull = pull - jnp.einsum("cmk,k->cm", b.h_xu, step)
+        free = qp.solve(damped, pull, unknowns.rows, unknowns.limits)
+        return free.x - x, jnp.einsum("cmn,cnk->cmk", free.inverse, b.h_xu)
+
+    def shape_step(x_step: Array, response: Array) -> Array:
+        schur = b.h_uu - jnp.einsum("cmk,cml->kl", b.h_xu, response)
+        gradient = b.g_u + jnp.einsum("cmk,cm->k", b.h_xu, x_step)
+        scale = jnp.maximum(jnp.diagonal(b.h_uu) * 1e-12, jnp.diagonal(schur))
+        matrix = schur + jnp.diag(damping * scale + 1e-300)
+        step = -qp.product(qp.inverse(matrix), gradient)
+        longest = jnp.max(jnp.abs(step)).clip(1e-300)
+        return step * jnp.minimum(1.0, _MAX_SHAPE_STEP / longest)
+
+    step, x_step = jnp.zeros_like(u), jnp.zeros_like(x)
+    if m and k:
+        # Once to see how the coefficients respond, once more after the shape has moved;
+        # in a loop, so that the quadratic program is compiled once.
+        def alternate(i: Array, carry: tuple[Array, Array]) -> tuple[Array, Array]:
+            x_step, response = coefficients(carry[0])
+            return jnp.where(i == 0, shape_step(x_step, response), carry[0]), x_step
+
+        step, x_step = jax.lax.fori_loop(0, 2, alternate, (step, x_step))
+    elif m:
+        x_step, _ = coefficients(step)
+    elif k:
+        step = shape_step(x_step, jnp.zeros_like(b.h_xu))
+    moved_u = b.h_uu @ step + 2.0 * jnp.einsum("cmk,cm->k", b.h_xu, x_step)
+    model_change = (
+        2.0 * jnp.dot(b.g_u, step)
+        + 2.0 * jnp.sum(b.g_x * x_step)
+        + jnp.dot(step, moved_u)
+        + jnp.sum(qp.product(b.h_xx, x_step) * x_step)
+    )
+    return (u + step, x + x_step), -model_change
+
+
+class _PlainLoop(optx.AbstractAdjoint):
+    """Run the iteration without a derivative rule; fits are not differentiated through."""
+
+    def apply(self, primal_fn, rewrite_fn, inputs, tags):
+        del rewrite_fn, tags
+
+        def loop(cond, body, init, *, max_steps):
+            return eqxi.while_loop(cond, body, init, max_steps=max_steps, kind="lax")
+
+        return primal_fn((*inputs, loop))
+
+
+@eqx.filter_jit
+def refine(problem: Problem, u0: Float[Array, " k"], x0: Float[Array, "c m"]) -> Solution:
+    """Run the solver from one start to the nearest minimum."""
+
+    def fn(y, args):
+        return reduced.evaluate(args, y[0], y[1], jnp.asarray(False))
+
+    out = optx.least_squares(
+        fn, ArrowLevenbergMarquardt(), (u0, x0), args=problem, max_steps=MAX_STEPS,
+        adjoint=_PlainLoop(), throw=False,
+    )  # fmt: skip
+    u, x = out.value
+    return Solution(
+        u, x, out.stats["cost"], out.stats["num_steps"],
+        out.result == optx.RESULTS.successful,
+    )  # fmt: skip
+
+
+@eqx.filter_jit
+def scan(
+    problem: Problem, candidates: Float[Array, "p k"]
+) -> tuple[Float[Array, " p"], Float[Array, "p c m"]]:
+    """Cost and coefficients of many shapes, with the residual linearised at the data."""
+    unknowns = problem.unknowns
+    c, m = problem.target.shape[0], unknowns.n_coefficients
+
+    def one(u: Array) -> tuple[Array, Array]:
+        x = jnp.zeros((c, m), dtype=u.dtype)
+        b = reduced.evaluate(problem, u, x, jnp.asarray(True))
+        if problem.resolves or m == 0:
+            return b.cost, b.x
+        best = qp.solve(
+            b.h_xx, qp.product(b.h_xx, b.x) - b.g_x, unknowns.rows, unknowns.limits
+        ).x
+        step = best - b.x
+        change = qp.product(b.h_xx, step)
+        return b.cost + jnp.sum((2.0 * b.g_x + change) * step), best
+
+    return jax.lax.map(one, candidates)
