@@ -21,9 +21,10 @@ class Model(eqx.Module):
     """A sum of lobes, ``Model("lambert + ggx")``; a pure function under JAX.
 
     ``model(parameters, geometry)`` is the BRDF, 1/sr without cosine, of shape ``(n, c)``
-    for coefficients of shape ``(c,)`` and ``(n,)`` if they are all scalars. ``parameters``
-    maps names such as ``"ggx.alpha"`` to values; see `parameters` for the names. Works
-    under ``jit``, ``vmap`` and ``grad``. Raises `ModelError` for a senseless expression.
+    for coefficients of shape ``(c,)`` and ``(n,)`` if they are all scalars; shape
+    parameters are scalars, or ``(c,)`` to give every channel its own. ``parameters`` maps
+    names such as ``"ggx.alpha"`` to values; see `parameters` for the names. Works under
+    ``jit``, ``vmap`` and ``grad``. Raises `ModelError` for a senseless expression.
     """
 
     lobes: tuple[Lobe, ...]
@@ -99,6 +100,8 @@ class Model(eqx.Module):
                 f"unknown {unknown}; it has {list(known)}"
             )
         values = {n: jnp.asarray(v) for n, v in parameters.items()}
+        if any(v.ndim and not known[n].coefficient for n, v in values.items()):
+            return _per_channel(self, values, geometry)
         shape = {n: v for n, v in values.items() if not known[n].coefficient}
         linear = {n: v for n, v in values.items() if known[n].coefficient}
         terms = [
@@ -112,6 +115,12 @@ class Model(eqx.Module):
         wide = max(t.ndim for t in terms)
         terms = [t[..., None] if t.ndim < wide else t for t in terms]
         return sum(terms[1:], terms[0])
+
+
+def _per_channel(model: Model, values: dict[str, Array], geometry: Geometry) -> Array:
+    channels = max(v.shape[0] for v in values.values() if v.ndim)
+    wide = {n: jnp.broadcast_to(v, (channels,)) for n, v in values.items()}
+    return jax.vmap(lambda one: model(one, geometry), out_axes=-1)(wide)
 
 
 def _known_lobes() -> tuple[str, ...]:

@@ -42,9 +42,7 @@ class Parameter:
         if not self.coefficient:
             start = (min(max(start[0], low), high), min(max(start[1], low), high))
         default = min(max(self.default, low), high)
-        return dataclasses.replace(
-            self, support=(low, high), start=start, default=default
-        )
+        return dataclasses.replace(self, support=(low, high), start=start, default=default)
 
 
 def shape(

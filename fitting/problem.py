@@ -134,7 +134,9 @@ def make_unknowns(model: Model, n_channels: int, options: FitOptions) -> Unknown
     Raises `ModelError` that names the parameter for a senseless fix, bound or tie.
     """
     declared = model.parameters()
-    fixed = {n: v for pattern, v in options.fix.items() for n in _matching(pattern, declared)}
+    fixed = {
+        n: v for pattern, v in options.fix.items() for n in _matching(pattern, declared)
+    }
     bounds = {
         n: b for pattern, b in options.bounds.items() for n in _matching(pattern, declared)
     }

@@ -82,9 +82,7 @@ def solve(
         full = inverse(g)
         x = product(full, b)
         none = jnp.zeros((g.shape[0], 0), dtype=bool)
-        return QPSolution(
-            x * size / d, full / (d[:, :, None] * d[:, None, :]), none
-        )
+        return QPSolution(x * size / d, full / (d[:, :, None] * d[:, None, :]), none)
 
     scaled = rows[None] / d[:, None, :]
     norm = jnp.linalg.norm(scaled, axis=-1)

@@ -11,6 +11,7 @@ by parameters) is never formed.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -202,8 +203,6 @@ def _accumulate(
 ) -> tuple[Array, Array, Array]:
     """Gram matrix of the features per channel, gradient in feature space, and cost."""
     n_basis = a.shape[1]
-    n_rows = problem.kappa.shape[0]
-    blocks = n_rows // problem.chunk
     n_features = n_basis + len(_dependents(problem))
     upper = jnp.triu_indices(n_features)
 
@@ -217,31 +216,7 @@ def _accumulate(
         f = a @ features[:n_basis]
         return contract(features, *_residual(problem, f, data, linearised))
 
-    rows = (
-        problem.geometry,
-        problem.kappa,
-        problem.weight,
-        problem.target,
-        problem.linear_target,
-        problem.linear_weight,
-    )
-    if blocks == 1:
-        total = chunk(rows)
-    else:
-
-        def split(v: Array) -> Array:
-            parts = v.reshape(*v.shape[:-1], blocks, problem.chunk)
-            return jnp.moveaxis(parts, -2, 0)
-
-        def add(carry, part):
-            return jax.tree.map(jnp.add, carry, chunk(part)), None
-
-        chunks = jax.tree.map(split, rows)
-        zero = jax.tree.map(
-            lambda s: jnp.zeros(s.shape, s.dtype),
-            jax.eval_shape(chunk, jax.tree.map(lambda v: v[0], chunks)),
-        )
-        total, _ = jax.lax.scan(add, zero, chunks)
+    total = _sum_chunks(problem, chunk)
     if problem.penalised:
         for features, phi in _penalty_rows(problem, u):
             r, d = phi(a @ features[:n_basis])
@@ -251,6 +226,35 @@ def _accumulate(
     full = full.at[:, upper[0], upper[1]].set(gram)
     full = full.at[:, upper[1], upper[0]].set(gram)
     return full, gradient, jnp.sum(cost)
+
+
+def _sum_chunks(problem: Problem, chunk: Callable):
+    """Sum of ``chunk(rows)`` over blocks of rows, so that memory does not grow with them."""
+    rows = (
+        problem.geometry,
+        problem.kappa,
+        problem.weight,
+        problem.target,
+        problem.linear_target,
+        problem.linear_weight,
+    )
+    blocks = problem.kappa.shape[0] // problem.chunk
+    if blocks == 1:
+        return chunk(rows)
+
+    def split(v: Array) -> Array:
+        parts = v.reshape(*v.shape[:-1], blocks, problem.chunk)
+        return jnp.moveaxis(parts, -2, 0)
+
+    def add(carry, part):
+        return jax.tree.map(jnp.add, carry, chunk(part)), None
+
+    chunks = jax.tree.map(split, rows)
+    zero = jax.tree.map(
+        lambda s: jnp.zeros(s.shape, s.dtype),
+        jax.eval_shape(chunk, jax.tree.map(lambda v: v[0], chunks)),
+    )
+    return jax.lax.scan(add, zero, chunks)[0]
 
 
 def _penalty_rows(problem: Problem, u: Array):
@@ -295,9 +299,7 @@ def _penalty_rows(problem: Problem, u: Array):
         yield _with_tangents(problem, difference, u), plain
 
 
-def evaluate(
-    problem: Problem, u: Array, x: Array, linearised: Bool[Array, ""]
-) -> Blocks:
+def evaluate(problem: Problem, u: Array, x: Array, linearised: Bool[Array, ""]) -> Blocks:
     """The blocks at ``(u, x)``; where the problem `resolves`, at the best ``x`` for ``u``."""
     a, da_dx, da_du = _amplitudes(problem, u, x)
     gram, gradient, cost = _accumulate(problem, u, a, linearised)
@@ -314,14 +316,7 @@ def evaluate(
         cost = cost + jnp.sum((2.0 * gradient + change) * step)
         gradient = gradient + change
         x, a = best, a + step[:, :n_basis]
-    # Derivatives of the basis functions, weighted by their amplitudes, make the columns
-    # of the shape unknowns.
-    pairs = _dependents(problem)
-    to_u = jnp.zeros((a.shape[0], n_features, u.shape[0]), a.dtype)
-    to_u = to_u.at[:, :n_basis].set(da_du)
-    for t, (j, k) in enumerate(pairs):
-        to_u = to_u.at[:, n_basis + t, k].add(a[:, j])
-    to_x = jnp.pad(da_dx, ((0, 0), (0, n_features - n_basis), (0, 0)))
+    to_x, to_u = _columns(problem, a, da_dx, da_du)
     gram_x = jnp.einsum("cfg,cgm->cfm", gram, to_x)
     gram_u = jnp.einsum("cfg,cgk->cfk", gram, to_u)
     return Blocks(
@@ -333,3 +328,44 @@ def evaluate(
         h_xu=jnp.einsum("cfm,cfk->cmk", to_x, gram_u),
         h_xx=jnp.einsum("cfm,cfn->cmn", to_x, gram_x),
     )
+
+
+def _columns(problem: Problem, a: Array, da_dx: Array, da_du: Array) -> tuple[Array, Array]:
+    """How the columns of the Jacobian are made of the features, ``(c, f, m)``, ``(c, f, k)``.
+
+    A column of the shape is the derivatives of the basis functions, weighted by their
+    amplitudes.
+    """
+    pairs = _dependents(problem)
+    n_basis = a.shape[1]
+    extra = ((0, 0), (0, len(pairs)), (0, 0))
+    to_x, to_u = jnp.pad(da_dx, extra), jnp.pad(da_du, extra)
+    for t, (j, k) in enumerate(pairs):
+        to_u = to_u.at[:, n_basis + t, k].add(a[:, j])
+    return to_x, to_u
+
+
+def sum_over_rows(
+    problem: Problem, u: Array, x: Array, function: Callable[..., Array]
+) -> Array:
+    """Sum over blocks of rows of ``function(r, d, columns_x, columns_u)``.
+
+    ``r, d (c, n)`` are residual and slope, ``columns_x (c, m, n)`` and ``columns_u
+    (c, k, n)`` the derivatives of the model's value in the unknowns.
+    """
+    a, da_dx, da_du = _amplitudes(problem, u, x)
+    to_x, to_u = _columns(problem, a, da_dx, da_du)
+
+    def chunk(rows):
+        geometry, *data = rows
+        features = _features(problem, u, geometry)
+        f = a @ features[: a.shape[1]]
+        r, d = _residual(problem, f, data, jnp.asarray(False))
+        return function(
+            r,
+            jnp.broadcast_to(d, r.shape),
+            jnp.einsum("cfm,fn->cmn", to_x, features),
+            jnp.einsum("cfk,fn->ckn", to_u, features),
+        )
+
+    return _sum_chunks(problem, chunk)

@@ -27,6 +27,19 @@ def solid_angle_weights(
     return weights
 
 
+def solid_angles(theta_r: np.ndarray, phi_r: np.ndarray) -> np.ndarray | None:
+    """Solid angle in sr of each row of one incidence, which together cover the rings.
+
+    None where the directions are not on rings, so that no absolute figure is known. Data
+    of one half of the hemisphere stand for both.
+    """
+    ring = _labels(theta_r[None])
+    count = int(ring.max()) + 1
+    if count < 4 or theta_r.size < 3 * count:
+        return None
+    return 2.0 * np.pi * _of_rings(theta_r, phi_r, ring)
+
+
 def incidence_labels(theta_i: np.ndarray) -> np.ndarray:
     """A running number per distinct polar angle of incidence, ascending."""
     return _labels(theta_i[None])
@@ -44,18 +57,26 @@ def _of_one_incidence(theta: np.ndarray, phi: np.ndarray) -> np.ndarray:
     count = ring.max() + 1
     if count > 3 and theta.size < 3 * count:
         return _of_scattered(theta, phi)
+    return _of_rings(theta, phi, ring)
+
+
+def _of_rings(theta: np.ndarray, phi: np.ndarray, ring: np.ndarray) -> np.ndarray:
+    """Zone of each ring times the share of its rows in the circle."""
+    count = int(ring.max()) + 1
     level = np.bincount(ring, theta) / np.bincount(ring)
     middle = 0.5 * (level[1:] + level[:-1])
-    lower = np.concatenate([[max(0.0, 1.5 * level[0] - 0.5 * level[1]) if count > 1 else 0.0],
-                            middle])  # fmt: skip
-    last = 1.5 * level[-1] - 0.5 * level[-2] if count > 1 else np.pi / 2
-    upper = np.concatenate([middle, [min(np.pi / 2, last) if level[-1] < np.pi / 2 else last]])
+    first = 1.5 * level[0] - 0.5 * level[1] if count > 1 else 0.0
+    last = 1.5 * level[-1] - 0.5 * level[-2] if count > 1 else 0.5 * np.pi
+    if level[-1] < 0.5 * np.pi:
+        last = min(last, 0.5 * np.pi)
+    lower = np.concatenate([[max(first, 0.0)], middle])
+    upper = np.concatenate([middle, [last]])
     zone = np.abs(np.cos(lower) - np.cos(upper)) + 1e-12
-    weights = np.empty(theta.size)
+    out = np.empty(theta.size)
     for k in range(count):
         rows = np.flatnonzero(ring == k)
-        weights[rows] = zone[k] * _azimuth_shares(phi[rows])
-    return weights
+        out[rows] = zone[k] * _azimuth_shares(phi[rows])
+    return out
 
 
 def _azimuth_shares(phi: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ _FIRST_DAMPING = 1e-3
 
 
 class Solution(NamedTuple):
-    """Where a start ended: unknowns, half... cost, and how it got there."""
+    """Where a start ended: unknowns, sum of squares, and how it got there."""
 
     u: Float[Array, " k"]
     x: Float[Array, "c m"]
@@ -62,9 +62,7 @@ class ArrowLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         zero = jnp.zeros((), dtype=jnp.float64)
         blocks = jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), f_struct)
         no = jnp.asarray(False)
-        return _State(
-            blocks, y, zero + _FIRST_DAMPING, zero + 2.0, zero + jnp.inf, no, no
-        )
+        return _State(blocks, y, zero + _FIRST_DAMPING, zero + 2.0, zero + jnp.inf, no, no)
 
     def step(self, fn, y, args, options, state, tags):
         del options, tags
@@ -87,9 +85,7 @@ class ArrowLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         small = predicted <= self.rtol * blocks.cost + self.atol * problem.scale
         stuck = damping > 1e12
         done = (state.started | accept) & (small | stuck)
-        state = _State(
-            blocks, at, damping, growth, predicted, state.started | accept, done
-        )
+        state = _State(blocks, at, damping, growth, predicted, state.started | accept, done)
         return proposal, state, aux
 
     def terminate(self, fn, y, args, options, state, tags):
@@ -104,7 +100,12 @@ class ArrowLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
 def propose(
     problem: Problem, at: tuple[Array, Array], b: Blocks, damping: Array
 ) -> tuple[tuple[Array, Array], Array]:
-    """Next point and the decrease of the cost that the quadratic model predicts for it."""
+    """Next point and the decrease of the cost that the quadratic model promises.
+
+    The promise is that of the reduced problem: what the coefficients gain alone plus what
+    the shape gains while they follow. It is never negative, also where a bound stops a
+    coefficient on the way; the next evaluation then tells whether the step was too long.
+    """
     u, x = at
     unknowns = problem.unknowns
     m, k = x.shape[1], u.shape[0]
@@ -117,36 +118,41 @@ def propose(
         free = qp.solve(damped, pull, unknowns.rows, unknowns.limits)
         return free.x - x, jnp.einsum("cmn,cnk->cmk", free.inverse, b.h_xu)
 
-    def shape_step(x_step: Array, response: Array) -> Array:
+    def shape_step(x_step: Array, response: Array) -> tuple[Array, Array]:
         schur = b.h_uu - jnp.einsum("cmk,cml->kl", b.h_xu, response)
         gradient = b.g_u + jnp.einsum("cmk,cm->k", b.h_xu, x_step)
         scale = jnp.maximum(jnp.diagonal(b.h_uu) * 1e-12, jnp.diagonal(schur))
         matrix = schur + jnp.diag(damping * scale + 1e-300)
         step = -qp.product(qp.inverse(matrix), gradient)
         longest = jnp.max(jnp.abs(step)).clip(1e-300)
-        return step * jnp.minimum(1.0, _MAX_SHAPE_STEP / longest)
+        step = step * jnp.minimum(1.0, _MAX_SHAPE_STEP / longest)
+        change = 2.0 * jnp.dot(gradient, step) + jnp.dot(step, schur @ step)
+        return step, jnp.maximum(-change, 0.0)
+
+    def coefficient_gain(x_step: Array) -> Array:
+        slope = 2.0 * b.g_x + qp.product(b.h_xx, x_step)
+        return jnp.maximum(-jnp.sum(slope * x_step), 0.0)
 
     step, x_step = jnp.zeros_like(u), jnp.zeros_like(x)
+    promise = jnp.zeros((), dtype=x.dtype)
     if m and k:
         # Once to see how the coefficients respond, once more after the shape has moved;
         # in a loop, so that the quadratic program is compiled once.
-        def alternate(i: Array, carry: tuple[Array, Array]) -> tuple[Array, Array]:
+        def alternate(i: Array, carry: tuple[Array, Array, Array]):
             x_step, response = coefficients(carry[0])
-            return jnp.where(i == 0, shape_step(x_step, response), carry[0]), x_step
+            step, gain = shape_step(x_step, response)
+            gain = gain + coefficient_gain(x_step)
+            first = i == 0
+            kept = jnp.where(first, step, carry[0]), jnp.where(first, gain, carry[2])
+            return kept[0], x_step, kept[1]
 
-        step, x_step = jax.lax.fori_loop(0, 2, alternate, (step, x_step))
+        step, x_step, promise = jax.lax.fori_loop(0, 2, alternate, (step, x_step, promise))
     elif m:
         x_step, _ = coefficients(step)
+        promise = coefficient_gain(x_step)
     elif k:
-        step = shape_step(x_step, jnp.zeros_like(b.h_xu))
-    moved_u = b.h_uu @ step + 2.0 * jnp.einsum("cmk,cm->k", b.h_xu, x_step)
-    model_change = (
-        2.0 * jnp.dot(b.g_u, step)
-        + 2.0 * jnp.sum(b.g_x * x_step)
-        + jnp.dot(step, moved_u)
-        + jnp.sum(qp.product(b.h_xx, x_step) * x_step)
-    )
-    return (u + step, x + x_step), -model_change
+        step, promise = shape_step(x_step, jnp.zeros_like(b.h_xu))
+    return (u + step, x + x_step), promise
 
 
 class _PlainLoop(optx.AbstractAdjoint):

@@ -36,9 +36,11 @@ def split(kind: Fresnel, shape: Shape, value: Array, cos_d: Array) -> tuple[Arra
     ``q = (1 - cos_d)^5``, linear in both.
     """
     if kind == "schlick":
-        # At retro-reflection a rounded cos_d may exceed 1 and q would be negative.
-        q = jnp.maximum(1.0 - cos_d, 0.0) ** 5
-        return value * (1.0 - q), value * q
+        # 1 - q written as a product keeps its digits at grazing, where q goes to 1. At
+        # retro-reflection a rounded cos_d may exceed 1, and q would be negative.
+        p = jnp.maximum(1.0 - cos_d, 0.0)
+        rest = cos_d * (1.0 + p * (1.0 + p * (1.0 + p * (1.0 + p))))
+        return value * rest, value * p**5
     return (value * dielectric(cos_d, shape["eta"]),)
 
 

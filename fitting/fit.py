@@ -1,0 +1,354 @@
+"""The fit: from a measurement and a model to a result."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import platform
+from collections.abc import Callable, Iterator
+from importlib.metadata import version
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from data_formats import Measurement
+from fitting import diagnostics, judge, problem, starts, summary
+from fitting.albedo import model_albedo
+from fitting.model import Model
+from fitting.options import FitOptions
+from fitting.predict import predict_geometry
+from fitting.problem import Rows, prepare, reciprocity_pairs, select_rows
+from fitting.reduced import Problem
+from fitting.result import (
+    SCHEMA_VERSION,
+    AngleError,
+    Channel,
+    CrossValidation,
+    Data,
+    DataAlbedo,
+    DataNote,
+    DataReciprocity,
+    Energy,
+    FitResult,
+    Reciprocity,
+    Settings,
+    Solver,
+)
+from fitting.solve import Solution, refine
+from fitting.summary import Found, joined_values
+from fitting.uncertainty import covariance
+
+Progress = Callable[[str], None]
+_SAME_COST = 1e-6
+_MAD_TO_SIGMA = 1.4826
+_HUBER = 1.345
+_DENSE_NODES = 32
+
+
+def fit(
+    measurement: Measurement,
+    model: Model | str,
+    options: FitOptions | None = None,
+    *,
+    cross_validate: bool = True,
+    colour: bool = False,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> FitResult:
+    """Fit a model to a measurement by least squares.
+
+    ``settings`` are fields of `FitOptions`, for instance ``objective="chi2"`` or
+    ``fix={"ggx.f90": 1.0}``. ``cross_validate`` refits with every angle of incidence left
+    out; ``colour`` adds Delta E 2000 (imports colour-science, 2 s). ``progress`` is called
+    with a word on what is being done.
+
+    Raises `MeasurementError` if no row is left to fit and `ModelError` for a senseless
+    model or option. Runs in float64 without changing JAX's configuration.
+    """
+    options = dataclasses.replace(options or FitOptions(), **settings)
+    model = model if isinstance(model, Model) else Model(model)
+    say = progress or (lambda _: None)
+    rows = select_rows(measurement, options.max_theta_deg)
+    with jax.enable_x64(True):
+        return _fit(measurement, rows, model, options, cross_validate, colour, say)
+
+
+def _fit(
+    measurement: Measurement,
+    rows: Rows,
+    model: Model,
+    options: FitOptions,
+    cross_validate: bool,
+    colour: bool,
+    say: Progress,
+) -> FitResult:
+    names = [c.name for c in measurement.channels]
+    objective = problem.resolve_objective(options.objective, rows.sigma is not None)
+    say("searching for the shape")
+    found = [_search(p, options) for p in _problems(rows, model, options)]
+    width = math.inf
+    if options.robust:
+        say("again with robust residuals")
+        width = _robust_width(rows, model, objective, options, found)
+        found = _again(rows, model, options, found, robust_width=width)
+    energy_active = False
+    wants_energy = options.energy != "hard" and float(options.energy) > 0
+    one_sided = not all(lobe.RECIPROCAL for lobe in model.lobes) and options.reciprocity > 0
+    if (wants_energy and _worst_albedo(model, found)[0] > 1.0) or one_sided:
+        say("again with the penalties")
+        found = _again(rows, model, options, found, robust_width=width, penalised=True)
+        energy_active = wants_energy
+    say("uncertainties")
+    covariances = [covariance(f.problem, f.solution.u, f.solution.x) for f in found]
+    values = joined_values(found)
+    predicted = predict_geometry(model, values, rows.geometry)
+    predicted = np.broadcast_to(predicted, rows.value.shape)
+    validation = None
+    if cross_validate:
+        say("leaving out each angle of incidence")
+        validation = _cross_validation(rows, model, objective, options, found, width)
+    parameters, correlations, words = summary.parameters(model, found, covariances, names)
+    albedo, theta, worst_channel = _worst_albedo(model, found)
+    return FitResult(
+        schema_version=SCHEMA_VERSION,
+        model=model.expression,
+        channels=[Channel(c.name, c.wavelength_nm) for c in measurement.channels],
+        parameters=parameters,
+        uncertainty_method="row-clustered sandwich, HC3",
+        correlations=correlations,
+        identifiability=words,
+        settings=_settings(objective, options),
+        scores=judge.scores(rows, predicted, options),
+        by_angle=judge.by_angle(rows, predicted, objective, options),
+        by_channel=judge.by_channel(rows, predicted, names),
+        cross_validation=validation,
+        energy=Energy(
+            max_albedo=albedo,
+            theta_deg=theta,
+            channel=names[worst_channel],
+            constraint="hard" if options.energy == "hard" else
+            ("penalty" if wants_energy else "none"),
+            weight=float(options.energy) if options.energy != "hard" else None,
+            active=energy_active,
+        ),
+        reciprocity=_reciprocity(model, values, options),
+        colour=_colour(measurement, rows, predicted) if colour else None,
+        solver=_solver(found, objective),
+        data=_data(measurement, rows),
+        versions=_versions(),
+        references=sorted({lobe.REFERENCE for lobe in model.lobes}),
+    )  # fmt: skip
+
+
+def _problems(
+    rows: Rows, model: Model, options: FitOptions, **kwargs: Any
+) -> Iterator[Problem]:
+    """One problem, or one per channel where each has its own shape."""
+    whole = prepare(rows, model, options, **kwargs)
+    if not options.per_channel_shape:
+        yield whole
+        return
+    for c in range(whole.target.shape[0]):
+        yield problem.for_channel(whole, c)
+
+
+def _search(p: Problem, options: FitOptions) -> Found:
+    count = max(1, options.starts) if p.unknowns.n_shape else 1
+    points, x = starts.best_starts(p, count)
+    ends = [
+        jax.device_get(refine(p, jnp.asarray(u), jnp.asarray(c)))
+        for u, c in zip(points, x, strict=True)
+    ]
+    return _best(p, ends)
+
+
+def _best(p: Problem, ends: list[Solution]) -> Found:
+    cost = [float(e.cost) if math.isfinite(e.cost) else math.inf for e in ends]
+    return Found(p, ends[int(np.argmin(cost))], tuple(cost))
+
+
+def _again(
+    rows: Rows, model: Model, options: FitOptions, found: list[Found], **kwargs: Any
+) -> list[Found]:
+    """Refit from the minima found, with other residuals."""
+    out: list[Found] = []
+    for p, before in zip(_problems(rows, model, options, **kwargs), found, strict=True):
+        u, x = jnp.asarray(before.solution.u), jnp.asarray(before.solution.x)
+        end = _best(p, [jax.device_get(refine(p, u, x))])
+        out.append(dataclasses.replace(end, costs=before.costs))
+    return out
+
+
+def _robust_width(
+    rows: Rows, model: Model, objective: str, options: FitOptions, found: list[Found]
+) -> float:
+    predicted = predict_geometry(model, joined_values(found), rows.geometry)
+    r = judge.residuals(rows, predicted, objective, options)[rows.valid]
+    spread = _MAD_TO_SIGMA * float(np.median(np.abs(r - np.median(r))))
+    return _HUBER * spread if spread > 0 else math.inf
+
+
+def _worst_albedo(model: Model, found: list[Found]) -> tuple[float, float, int]:
+    """Largest directional albedo, its polar angle in deg, and the channel, densely."""
+    theta = np.concatenate([np.arange(0.0, 80.0, 4.0), np.arange(80.0, 90.0, 0.5)])
+    cosines = jnp.asarray(np.cos(np.radians(theta)))
+    azimuths = (0.0, 45.0, 90.0, 135.0) if model.anisotropic else (0.0,)
+    worst = (-math.inf, 0.0, 0)
+    channel = 0
+    for f in found:
+        for azimuth in azimuths:
+            e = np.asarray(
+                model_albedo(
+                    model, f.values(), cosines,
+                    azimuth=math.radians(azimuth), nodes=_DENSE_NODES,
+                )
+            ).reshape(theta.size, -1)  # fmt: skip
+            k, c = np.unravel_index(int(np.argmax(e)), e.shape)
+            worst = max(worst, (float(e[k, c]), float(theta[k]), channel + int(c)))
+        channel += f.solution.x.shape[0]
+    return worst
+
+
+def _reciprocity(
+    model: Model, values: dict[str, np.ndarray], options: FitOptions
+) -> Reciprocity:
+    pairs = reciprocity_pairs()
+    there = predict_geometry(model, values, pairs)
+    back = predict_geometry(model, values, pairs.swapped)
+    size = np.maximum(0.5 * (np.abs(there) + np.abs(back)), 1e-300)
+    by_construction = all(lobe.RECIPROCAL for lobe in model.lobes)
+    return Reciprocity(
+        float(np.max(np.abs(there - back) / size)),
+        by_construction,
+        None if by_construction else options.reciprocity,
+    )
+
+
+def _cross_validation(
+    rows: Rows,
+    model: Model,
+    objective: str,
+    options: FitOptions,
+    found: list[Found],
+    width: float,
+) -> CrossValidation | None:
+    """Refit without each angle of incidence, from the minimum of the whole."""
+    theta = judge.theta_i_of(rows)
+    errors: list[AngleError] = []
+    total, count, squares = 0.0, 0, 0.0
+    for held in judge.folds(rows):
+        keep = np.ones(rows.index.size)
+        keep[held] = 0.0
+        ends = []
+        kwargs: dict[str, Any] = {"robust_width": width, "row_weights": keep}
+        kwargs["penalised"] = found[0].problem.penalised
+        for p, f in zip(_problems(rows, model, options, **kwargs), found, strict=True):
+            u, x = jnp.asarray(f.solution.u), jnp.asarray(f.solution.x)
+            ends.append(Found(p, jax.device_get(refine(p, u, x)), ()))
+        predicted = predict_geometry(model, joined_values(ends), rows.geometry)
+        predicted = np.broadcast_to(predicted, rows.value.shape)
+        r = judge.residuals(rows, predicted, objective, options)
+        errors.append(judge.angle_error(rows, r, predicted, theta, held))
+        total += float(np.sum(r[held] ** 2))
+        count += int(rows.valid[held].sum())
+        squares += errors[-1].l2 ** 2 * held.size
+    if not errors:
+        return None
+    each = np.asarray([e.objective for e in errors])
+    return CrossValidation(
+        objective=math.sqrt(total / max(count, 1)),
+        standard_error=float(each.std(ddof=1) / math.sqrt(each.size)),
+        l2=math.sqrt(squares / rows.index.size),
+        by_angle=errors,
+    )
+
+
+def _solver(found: list[Found], objective: str) -> Solver:
+    converged = all(bool(f.solution.converged) for f in found)
+    cost = sum(float(f.solution.cost) for f in found)
+    best = [min(f.costs) for f in found]
+    agreeing = min(
+        sum(c <= b * (1 + _SAME_COST) + 1e-300 for c in f.costs)
+        for f, b in zip(found, best, strict=True)
+    )
+    n_starts = min(len(f.costs) for f in found)
+    others = [
+        min(c for c in f.costs if c > b * (1 + _SAME_COST)) / b
+        for f, b in zip(found, best, strict=True)
+        if b > 0 and any(b * (1 + _SAME_COST) < c < math.inf for c in f.costs)
+    ]
+    steps = max(int(f.solution.steps) for f in found)
+    if not converged:
+        sentence = f"stopped after {steps} steps without convergence"
+    elif n_starts == 1:
+        sentence = f"converged in {steps} steps from a single start"
+    elif agreeing == n_starts:
+        sentence = f"converged in {steps} steps; all {n_starts} starts agree"
+    else:
+        sentence = (
+            f"converged in {steps} steps; {agreeing} of {n_starts} starts reach the best "
+            f"minimum, the next one costs {min(others, default=math.nan):.4g} times as much"
+        )
+    return Solver(
+        sentence=f"{sentence} ({objective})",
+        converged=converged,
+        cost=cost,
+        steps=steps,
+        starts=n_starts,
+        starts_agreeing=agreeing,
+        runner_up_cost_ratio=min(others) if others else None,
+    )
+
+
+def _settings(objective: str, options: FitOptions) -> Settings:
+    def end(v: float) -> float | None:
+        return float(v) if math.isfinite(v) else None
+
+    return Settings(
+        objective=objective,
+        weights=options.weights,
+        max_theta_deg=options.max_theta_deg,
+        robust=options.robust,
+        noise=options.noise,
+        per_channel_shape=options.per_channel_shape,
+        starts=options.starts,
+        fix={k: [float(x) for x in np.atleast_1d(v)] for k, v in options.fix.items()},
+        bounds={k: (end(a), end(b)) for k, (a, b) in options.bounds.items()},
+        tie=dict(options.tie),
+    )
+
+
+def _data(m: Measurement, rows: Rows) -> Data:
+    reciprocity = diagnostics.data_reciprocity(m)
+    return Data(
+        path=m.provenance.path,
+        sha256=m.provenance.sha256,
+        format=m.provenance.format,
+        instrument=m.provenance.instrument,
+        sample=m.provenance.sample,
+        date=m.provenance.date,
+        symmetry=m.symmetry,
+        rows=m.n_rows,
+        rows_used=int(rows.index.size),
+        left_out=list(rows.left_out),
+        notes=[DataNote(n.code, n.sentence, n.count) for n in m.notes],
+        reciprocity=None if reciprocity is None else DataReciprocity(*reciprocity),
+        albedo=[
+            DataAlbedo(math.degrees(t), a, c) for t, a, c in diagnostics.data_albedo(m)
+        ],
+    )
+
+
+def _colour(measurement: Measurement, rows: Rows, predicted: np.ndarray):
+    from fitting.colour import colour_difference
+
+    if measurement.wavelengths is None:
+        return None
+    return colour_difference(measurement.wavelengths, rows, predicted)
+
+
+def _versions() -> dict[str, str]:
+    packages = ("brdf-fitting", "jax", "jaxlib", "optimistix", "equinox", "numpy")
+    return {"python": platform.python_version()} | {p: version(p) for p in packages}

@@ -1,0 +1,206 @@
+"""Parameters, uncertainties, correlations and what they mean, in words."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from fitting.model import Model
+from fitting.parameters import to_value
+from fitting.reduced import Problem
+from fitting.result import Correlations, ParameterResult, finite_or_none
+from fitting.solve import Solution
+from fitting.uncertainty import Covariance
+
+_STRONG = 0.95
+_AT_BOUND_SHARE = 5e-4
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """The best minimum of one problem (all channels, or one of them), and all costs."""
+
+    problem: Problem
+    solution: Solution
+    costs: tuple[float, ...]
+
+    def values(self) -> dict[str, np.ndarray]:
+        """All parameters by name; coefficients ``(c,)``."""
+        unknowns = self.problem.unknowns
+        shape = unknowns.shape(jnp.asarray(self.solution.u))
+        constant = np.asarray(unknowns.coefficient_constant)
+        linear = [
+            unknowns.coefficients(x, constant[:, c]) for c, x in enumerate(self.solution.x)
+        ]
+        own = {n: np.asarray(v) for n, v in shape.items()}
+        return own | {
+            n: np.asarray([float(one[n]) for one in linear])
+            for n in unknowns.coefficient_names
+        }
+
+
+def joined_values(found: list[Found]) -> dict[str, np.ndarray]:
+    """All parameters by name; with several problems, one value per channel each."""
+    parts = [f.values() for f in found]
+    if len(parts) == 1:
+        return parts[0]
+    return {n: np.concatenate([np.atleast_1d(p[n]) for p in parts]) for n in parts[0]}
+
+
+@dataclasses.dataclass(frozen=True)
+class _Errors:
+    """Standard uncertainties and bounds of one problem, by free unknown."""
+
+    shape: np.ndarray
+    shape_at_bound: np.ndarray
+    coefficient: np.ndarray
+    coefficient_at_bound: np.ndarray
+    correlation: np.ndarray
+
+
+def _errors(f: Found, cov: Covariance) -> _Errors:
+    unknowns = f.problem.unknowns
+    c, m = f.solution.x.shape
+    k = unknowns.n_shape
+    u = np.asarray(f.solution.u)
+    lower, upper = np.asarray(unknowns.lower), np.asarray(unknowns.upper)
+    slope = np.array(
+        [
+            float(jax.grad(lambda v, j=j: to_value(unknowns.scales[j], v, lower[j], upper[j]))(u[j]))
+            for j in range(k)
+        ]
+    )  # fmt: skip
+    share = 1.0 / (1.0 + np.exp(-u))
+    periodic = np.array([s == "periodic" for s in unknowns.scales], dtype=bool)
+    shape_at = (np.minimum(share, 1 - share) < _AT_BOUND_SHARE) & ~periodic
+    scale = np.concatenate([np.ones(c * m), slope])
+    matrix = np.asarray(cov.matrix) * np.outer(scale, scale)
+    rows, active = np.asarray(unknowns.rows), np.asarray(cov.active)
+    unit = np.sum(rows != 0, axis=1) == 1
+    at = np.array(
+        [
+            [np.any(active[i] & unit & (rows[:, j] != 0)) for j in range(m)]
+            for i in range(c)
+        ],
+        dtype=bool,
+    ).reshape(c, m)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        sd = np.sqrt(np.clip(np.diag(matrix), 0.0, None))
+        correlation = matrix / np.outer(sd, sd)
+    sd_x, sd_u = sd[: c * m].reshape(c, m), sd[c * m :]
+    per_channel = np.empty((c, k + m, k + m))
+    bad = np.zeros((c, k + m), dtype=bool)
+    for i in range(c):
+        index = np.concatenate([c * m + np.arange(k), i * m + np.arange(m)])
+        per_channel[i] = correlation[np.ix_(index, index)]
+        bad[i] = np.concatenate([shape_at, at[i]])
+    per_channel = np.clip(per_channel, -1.0, 1.0)
+    per_channel[bad[:, :, None] | bad[:, None, :]] = np.nan
+    return _Errors(
+        np.where(shape_at, np.nan, sd_u),
+        shape_at,
+        np.where(at, np.nan, sd_x),
+        at,
+        per_channel,
+    )
+
+
+def parameters(
+    model: Model, found: list[Found], covariances: list[Covariance], channels: list[str]
+) -> tuple[list[ParameterResult], Correlations, list[str]]:
+    """The table of parameters, their correlations per channel, and sentences."""
+    unknowns = found[0].problem.unknowns
+    errors = [_errors(f, c) for f, c in zip(found, covariances, strict=True)]
+    values = joined_values(found)
+    table: list[ParameterResult] = []
+    sources = dict(zip(unknowns.shape_names, unknowns.shape_source, strict=True))
+    sources |= dict(
+        zip(unknowns.coefficient_names, unknowns.coefficient_source, strict=True)
+    )
+    free_shape = _masters(unknowns.shape_names, unknowns.shape_source, unknowns.n_shape)
+    free_linear = _masters(
+        unknowns.coefficient_names, unknowns.coefficient_source, unknowns.n_coefficients
+    )
+    for name, declared in model.parameters().items():
+        index, factor = sources[name]
+        value = np.atleast_1d(values[name])
+        if index < 0:
+            sd, at = np.full(value.size, np.nan), np.zeros(value.size, dtype=bool)
+        elif declared.coefficient:
+            sd = np.concatenate([e.coefficient[:, index] for e in errors])
+            at = np.concatenate([e.coefficient_at_bound[:, index] for e in errors])
+        else:
+            sd = np.array([e.shape[index] for e in errors])
+            at = np.array([e.shape_at_bound[index] for e in errors])
+        if declared.scale == "periodic" and not declared.coefficient:
+            value = np.mod(value - declared.support[0], np.ptp(declared.support))
+        free = free_linear if declared.coefficient else free_shape
+        table.append(
+            ParameterResult(
+                name=name,
+                kind="coefficient" if declared.coefficient else "shape",
+                unit=declared.unit,
+                meaning=declared.meaning,
+                support=tuple(finite_or_none(s) for s in declared.support),
+                value=[float(v) for v in value],
+                standard_uncertainty=[finite_or_none(abs(factor) * s) for s in sd],
+                at_bound=[bool(a) for a in at],
+                fixed=index < 0,
+                tied_to=free[index] if index >= 0 and free[index] != name else None,
+            )
+        )
+    names = [*free_shape, *free_linear]
+    blocks = np.concatenate([e.correlation for e in errors])
+    correlations = Correlations(
+        names, [[[finite_or_none(v) for v in row] for row in block] for block in blocks]
+    )
+    return table, correlations, _identifiability(table, names, blocks, channels)
+
+
+def _masters(
+    names: tuple[str, ...], source: tuple[tuple[int, float], ...], count: int
+) -> list[str]:
+    out = [""] * count
+    for name, (index, factor) in zip(names, source, strict=True):
+        if index >= 0 and factor == 1.0 and not out[index]:
+            out[index] = name
+    return out
+
+
+def _identifiability(
+    table: list[ParameterResult], names: list[str], blocks: np.ndarray, channels: list[str]
+) -> list[str]:
+    """Sentences on what the data leave open."""
+    out: list[str] = []
+    for (i, a), (j, b) in itertools.combinations(enumerate(names), 2):
+        pair = blocks[:, i, j]
+        strong = np.flatnonzero(np.nan_to_num(np.abs(pair)) > _STRONG)
+        if not strong.size:
+            continue
+        worst = strong[np.argmax(np.abs(pair[strong]))]
+        known = "sum" if pair[worst] < 0 else "difference"
+        where = f"in {strong.size} of {len(channels)} channels" if len(channels) > 1 else ""
+        out.append(
+            f"{a} and {b} trade off {where}".rstrip()
+            + f" (correlation {pair[worst]:+.3f} at {channels[worst]}): their scaled {known} "
+            "is known, not their split"
+        )
+    for p in table:
+        if p.fixed or p.tied_to:
+            continue
+        pairs = list(zip(p.value, p.standard_uncertainty, strict=True))
+        loose = sum(s is not None and s > abs(v) for v, s in pairs)
+        bound = sum(p.at_bound)
+        of = f" in {{}} of {len(pairs)} channels" if len(pairs) > 1 else ""
+        if bound:
+            out.append(f"{p.name} is at a bound{of.format(bound)}")
+        if loose:
+            out.append(
+                f"{p.name} is not determined{of.format(loose)}: its standard uncertainty "
+                "exceeds its value"
+            )
+    return out or ["every free parameter is determined by the data on its own"]
