@@ -1,0 +1,106 @@
+"""Several models on the same data, and the one to keep."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from data_formats import Measurement
+from fitting.fitter import Progress, fit
+from fitting.options import FitOptions
+from fitting.result import FitResult
+
+# What is tried when the user names no model: diffuse plus one lobe with long, short and
+# bounded skirts, and a second lobe for surfaces of two scales.
+DEFAULT_MODELS = (
+    "lambert + ggx",
+    "lambert + beckmann",
+    "lambert + ward",
+    "lambert + 2*ggx",
+)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Results in the order of the models, the index of the one to keep, and why."""
+
+    results: tuple[FitResult, ...]
+    best: int
+    reason: str
+
+
+def n_free(result: FitResult) -> int:
+    """Number of free parameters, one per channel where they differ by channel."""
+    return sum(len(p.value) for p in result.parameters if not p.fixed and p.tied_to is None)
+
+
+def compare(
+    measurement: Measurement,
+    models: tuple[str, ...] = DEFAULT_MODELS,
+    options: FitOptions | None = None,
+    *,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> Comparison:
+    """Fit every model and keep the smallest one that predicts as well as the best.
+
+    As well means: its held-out error, angle of incidence by angle of incidence, exceeds
+    that of the best by less than one standard error of the difference (the rule of
+    Breiman et al. 1984, Classification and Regression Trees, sec. 3.4.3, paired).
+    """
+    say = progress or (lambda _: None)
+    results = tuple(
+        fit(measurement, m, options, progress=lambda s, m=m: say(f"{m}: {s}"), **settings)
+        for m in models
+    )
+    best, reason = choose(results)
+    return Comparison(results, best, reason)
+
+
+def choose(results: tuple[FitResult, ...]) -> tuple[int, str]:
+    """Index of the result to keep, and why, in one sentence."""
+    if len(results) == 1:
+        return 0, f"{results[0].model} is the only model asked for"
+    held = [_held_out(r) for r in results]
+    if any(h is None for h in held):
+        cost = [r.solver.cost for r in results]
+        best = int(np.argmin(cost))
+        return best, (
+            f"{results[best].model} fits best; a single angle of incidence leaves nothing "
+            "to hold out, so more parameters always look better"
+        )
+    errors = np.asarray([h for h in held if h is not None])
+    total = [r.cross_validation.objective for r in results if r.cross_validation]
+    top = int(np.argmin(total))
+    near = [i for i in range(len(results)) if i == top or _as_good(errors[i], errors[top])]
+    best = min(near, key=lambda i: (n_free(results[i]), total[i]))
+    name, number = results[best].model, n_free(results[best])
+    if best == top:
+        larger = [i for i in near if i != best and n_free(results[i]) > number]
+        why = f"{name} has the smallest held-out error ({total[best]:.4g})"
+        if larger:
+            why += ", and no larger model predicts better"
+        return best, why
+    gain = 100 * (1 - total[top] / total[best])
+    return best, (
+        f"{name} with {number} parameters predicts unseen angles as well as "
+        f"{results[top].model} with {n_free(results[top])} (whose held-out error is "
+        f"{gain:.1f} % smaller, within one standard error)"
+    )
+
+
+def _held_out(result: FitResult) -> np.ndarray | None:
+    if result.cross_validation is None:
+        return None
+    return np.asarray([a.objective**2 for a in result.cross_validation.by_angle])
+
+
+def _as_good(errors: np.ndarray, best: np.ndarray) -> bool:
+    difference = errors - best
+    if difference.size < 2:
+        return bool(difference.mean() <= 0)
+    standard_error = difference.std(ddof=1) / math.sqrt(difference.size)
+    return bool(difference.mean() <= standard_error)
