@@ -6,7 +6,7 @@ move smoothly with the widths of the lobe, so that the albedo can be differentia
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -22,18 +22,19 @@ NODES = 16
 def albedo_basis(
     lobe: Lobe,
     shape: Shape,
-    cos_theta: Float[ArrayLike, " k"],
+    cos_theta: ArrayLike | Sequence[float],
     *,
     azimuth: ArrayLike = 0.0,
     nodes: int = NODES,
 ) -> tuple[Float[Array, " k"], ...]:
     """Directional albedo of each basis function of a lobe.
 
-    ``cos_theta`` are the cosines of the detector's polar angles in [0, 1], ``azimuth`` its
-    azimuth in radians. ``nodes`` is the number per dimension. A lobe with slope widths is
-    integrated over the half vector, up to the exact horizon: with 16 nodes the error is
-    below 1e-3 for every width at ``cos_theta >= 0.1`` and falls fast for wide lobes;
-    other lobes are integrated over the source direction. In float64 if JAX has it enabled.
+    ``cos_theta (k,)`` are the cosines of the detector's polar angles in [0, 1], ``azimuth``
+    its azimuth in radians. ``nodes`` is the number per dimension. A lobe with slope widths
+    is integrated over the half vector, up to the exact horizon: with 8, 16, 32 nodes the
+    error is below 1.3e-2, 2e-3, 5e-4 for every width at ``cos_theta >= 0.02``. Other lobes
+    are integrated over the source direction: with 16 nodes the error of the diffuse ones is
+    below 1e-6. In float64 if JAX has it enabled, else in float32.
     """
     dtype = jnp.result_type(float)
     mu = jnp.asarray(cos_theta, dtype)[:, None, None]
@@ -52,7 +53,7 @@ def albedo_basis(
 def model_albedo(
     model: Model,
     parameters: Mapping[str, ArrayLike],
-    cos_theta: Float[ArrayLike, " k"],
+    cos_theta: ArrayLike | Sequence[float],
     *,
     azimuth: ArrayLike = 0.0,
     nodes: int = NODES,
@@ -87,8 +88,15 @@ def _detector(mu: Array, azimuth: Array) -> tuple[Array, Array]:
 
 def _unit_nodes(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss-Legendre nodes and weights on [0, 1]."""
-    x, w = np.polynomial.legendre.leggauss(count)
+    x, w = np.polynomial.legendre.leggauss(max(count, 1))
     return 0.5 * (x + 1.0), 0.5 * w
+
+
+def _quarters(count: int, quarters: int) -> tuple[np.ndarray, np.ndarray]:
+    """Azimuths and weights of as many quarters of the circle, ``count`` nodes in each."""
+    x, w = _unit_nodes(count)
+    phi = 0.5 * np.pi * (np.arange(quarters)[:, None] + x)
+    return phi.ravel(), 0.5 * np.pi * np.tile(w, quarters)
 
 
 def _over_half_vector(
@@ -102,21 +110,24 @@ def _over_half_vector(
     """Nodes ``(k, nodes, azimuths)`` of the half vector, and ``cos_i dwi`` at each.
 
     Slopes are ``r (alpha_x cos(phi), alpha_y sin(phi))`` in the tangent frame with
-    ``r = tan v``, Gauss-Legendre nodes in ``v`` and midpoints in ``phi``. The measure is
-    ``dwi = 4 cos_d dwh``, ``dwh = cos^3(theta_h) alpha_x alpha_y r dr dphi``. The source is
-    on the horizon where ``tan(theta_h) = (R + p) / cos_o`` with ``p`` the component of wo
-    along the azimuth of the half vector and ``R^2 = p^2 + cos_o^2``. Where the lobe is
-    round, half a circle from the detector's azimuth stands for both.
+    ``r = tan v`` and Gauss-Legendre nodes in ``v`` and in quarters of ``phi`` that begin at
+    the detector. The measure is ``dwi = 4 cos_d dwh``, ``dwh = cos^3(theta_h) alpha_x
+    alpha_y r dr dphi``. The source is on the horizon where ``tan(theta_h) = (R + p) /
+    cos_o`` with ``p`` the component of wo along the azimuth of the half vector and
+    ``R^2 = p^2 + cos_o^2``: for a grazing detector this bends sharply at ``p = 0``, where
+    the quarters meet. Where the lobe is round, half a circle stands for both.
     """
     dtype = mu.dtype
     x_o, y_o = _detector(mu, azimuth)
     ax, ay, angle = widths
     ca, sa = jnp.cos(angle), jnp.sin(angle)
-    count = 2 * nodes if full_circle else nodes
-    span = 2.0 * np.pi if full_circle else np.pi
-    phi = span * (np.arange(count) + 0.5) / count
-    ux = ax * jnp.asarray(np.cos(phi), dtype)
-    uy = ay * jnp.asarray(np.sin(phi), dtype)
+    phi, dphi = _quarters(nodes // 2, 4 if full_circle else 2)
+    dphi = jnp.asarray(dphi if full_circle else 2.0 * dphi, dtype)
+    start_x, start_y = ax * jnp.cos(azimuth - angle), ay * jnp.sin(azimuth - angle)
+    start = jnp.sqrt(start_x * start_x + start_y * start_y)
+    c, s = jnp.asarray(np.cos(phi), dtype), jnp.asarray(np.sin(phi), dtype)
+    ux = ax * (c * start_x - s * start_y) / start
+    uy = ay * (s * start_x + c * start_y) / start
     rho = jnp.sqrt(ux * ux + uy * uy)
     px, py = (ca * ux - sa * uy) / rho, (sa * ux + ca * uy) / rho
 
@@ -142,7 +153,7 @@ def _over_half_vector(
         wox=x_o, woy=y_o, cos_o=mu,
         hx=hx, hy=hy, hz=hz, cos_d=cos_d,
     )  # fmt: skip
-    dwh = hz * hz * hz * (ax * ay) * r * dr * (2.0 * np.pi / count)
+    dwh = hz * hz * hz * (ax * ay) * r * dr * dphi
     return geometry, geometry.cos_i * 4.0 * cos_d * dwh
 
 
@@ -154,16 +165,14 @@ def _over_source(mu: Array, azimuth: Array, nodes: int) -> tuple[Geometry, Array
     """
     dtype = mu.dtype
     x_o, y_o = _detector(mu, azimuth)
-    x, w = _unit_nodes(max(nodes // 2, 1))
+    x, w = _unit_nodes(nodes // 2)
     x, w = jnp.asarray(x, dtype)[:, None], jnp.asarray(w, dtype)[:, None]
     middle = jnp.arccos(mu)
     rest = 0.5 * np.pi - middle
     theta = jnp.concatenate([middle * x, middle + rest * x], axis=1)
     dtheta = jnp.concatenate([middle * w, rest * w], axis=1)
 
-    x, w = _unit_nodes(max(nodes // 4, 1))
-    phi = jnp.asarray(0.5 * np.pi * (np.arange(4)[:, None] + x).ravel(), dtype)
-    dphi = jnp.asarray(0.5 * np.pi * np.tile(w, 4), dtype)
+    phi, dphi = (jnp.asarray(a, dtype) for a in _quarters(nodes // 4, 4))
     sine, cosine = jnp.sin(theta), jnp.cos(theta)
     geometry = from_components(
         sine * jnp.cos(phi + azimuth), sine * jnp.sin(phi + azimuth), cosine,

@@ -344,7 +344,7 @@ def _data(m: Measurement, rows: Rows) -> Data:
 def _colour(measurement: Measurement, rows: Rows, predicted: np.ndarray):
     from fitting.colour import colour_difference
 
-    if measurement.wavelengths is None:
+    if measurement.wavelengths is None or measurement.wavelengths.size < 5:
         return None
     return colour_difference(measurement.wavelengths, rows, predicted)
 

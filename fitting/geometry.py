@@ -7,6 +7,8 @@ Half vectors are formed here in float64 and stored, because ``sin^2(theta_h)`` t
 
 from __future__ import annotations
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -56,7 +58,8 @@ def from_components(wix, wiy, wiz, wox, woy, woz) -> Geometry:
     Differentiable in the directions everywhere but at ``wi = -wo``, where the gradient
     is zero.
     """
-    lib = np if all(isinstance(a, np.ndarray) for a in (wix, wiz, wox, woz)) else jnp
+    plain = all(isinstance(a, np.ndarray) for a in (wix, wiz, wox, woz))
+    lib: Any = np if plain else jnp
     sx, sy, sz = wix + wox, wiy + woy, wiz + woz
     norm2 = sx * sx + sy * sy + sz * sz
     defined = norm2 > 1e-24

@@ -58,8 +58,7 @@ class Model(eqx.Module):
         """Number of basis functions of one lobe."""
         lobe = self.lobes[index]
         shape = {p.name: 0.5 for p in lobe.parameters() if not p.coefficient}
-        dot = jax.ShapeDtypeStruct((1,), jnp.float32)
-        geometry = Geometry(*[dot] * len(Geometry.__dataclass_fields__))
+        geometry = Geometry(*[jnp.ones(1)] * len(Geometry.__dataclass_fields__))
         return len(jax.eval_shape(lobe.basis, shape, geometry))
 
     def of_lobe(self, index: int, values: Mapping[str, Array]) -> dict[str, Array]:

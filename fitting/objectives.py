@@ -1,7 +1,7 @@
 """What is made small: residuals between model and data, by name.
 
-Every objective is ``r = w (phi(f kappa) - phi(y kappa))`` with a transformation ``phi``, a
-factor ``kappa`` per row (the cosine of the detector or 1, over a scale), and a weight ``w``.
+Every objective is ``r = w (phi(f kappa) - phi(y kappa))`` with a transformation ``phi``,
+a factor ``kappa`` per row (the cosine of the detector or 1, over a scale), and a weight.
 All transformations are odd and smooth through zero, so that negative measured values,
 which dark-current subtraction produces, count for what they are.
 """
@@ -9,13 +9,15 @@ which dark-current subtraction produces, count for what they are.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
 ObjectiveName = Literal["log1p", "asinh", "cbrt", "l2cos", "chi2", "l2"]
+
+AnyArray = TypeVar("AnyArray", Array, np.ndarray)
 
 _CBRT_ROUNDING = 1e-3
 
@@ -50,13 +52,13 @@ OBJECTIVES: dict[str, Objective] = {
 }
 
 
-def transform(name: str, v: Array) -> Array:
+def transform(name: str, v: AnyArray) -> AnyArray:
     """``phi(v)``: identity, ``sign(v) log1p(|v|)``, ``asinh(v)``, or a rounded cube root.
 
     The cube root is ``v / (v^2 + e^2)^(1/3)`` with e = 1e-3 (in units of the data's
     median), because the derivative of the true one is infinite at zero.
     """
-    lib = np if isinstance(v, np.ndarray) else jnp
+    lib = _library(v)
     if name == "log1p":
         return lib.sign(v) * lib.log1p(lib.abs(v))
     if name == "asinh":
@@ -66,9 +68,9 @@ def transform(name: str, v: Array) -> Array:
     return v
 
 
-def slope(name: str, v: Array) -> Array:
+def slope(name: str, v: AnyArray) -> AnyArray:
     """``d phi / d v``, finite everywhere."""
-    lib = np if isinstance(v, np.ndarray) else jnp
+    lib = _library(v)
     if name == "log1p":
         return 1.0 / (1.0 + lib.abs(v))
     if name == "asinh":
@@ -77,6 +79,10 @@ def slope(name: str, v: Array) -> Array:
         e2 = _CBRT_ROUNDING**2
         return (v * v / 3.0 + e2) * (v * v + e2) ** (-4.0 / 3.0)
     return lib.ones_like(v)
+
+
+def _library(v: AnyArray) -> Any:
+    return np if isinstance(v, np.ndarray) else jnp
 
 
 def pseudo_huber(r: Array, width: Array) -> tuple[Array, Array]:

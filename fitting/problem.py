@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from data_formats import Measurement, MeasurementError
 from fitting import geometry, objectives
@@ -315,9 +316,9 @@ def prepare(
     if OBJECTIVES[objective].linear:
         linear_weight = weight * terms.kappa
 
-    def pad(a: np.ndarray, fill: float = 0.0) -> np.ndarray:
+    def pad(a: np.ndarray, fill: float = 0.0) -> jax.Array:
         width = [(0, 0)] * (a.ndim - 1) + [(0, size - n)]
-        return np.pad(a, width, constant_values=fill)
+        return _float64(np.pad(a, width, constant_values=fill))
 
     # Padded rows look along the normal, where every lobe is finite.
     normal = geometry.from_angles(0.0, 0.0, 0.0, 0.0)
@@ -326,7 +327,7 @@ def prepare(
     )
     scale = float(np.sum((weight * terms.target) ** 2))
     energy = 0.0 if options.energy == "hard" else float(options.energy)
-    problem = Problem(
+    return Problem(
         model=model,
         unknowns=make_unknowns(model, n_channels, options),
         objective=objective,
@@ -339,13 +340,16 @@ def prepare(
         target=pad(terms.target),
         linear_target=pad(terms.value),
         linear_weight=pad(linear_weight),
-        robust_width=np.asarray(robust_width),
-        energy_weight=np.asarray(energy * scale / n_channels),
-        reciprocity_weight=np.asarray(options.reciprocity * scale / n_channels),
-        scale=np.asarray(scale),
-        pairs=reciprocity_pairs(),
+        robust_width=_float64(robust_width),
+        energy_weight=_float64(energy * scale / n_channels),
+        reciprocity_weight=_float64(options.reciprocity * scale / n_channels),
+        scale=_float64(scale),
+        pairs=jax.tree.map(_float64, reciprocity_pairs()),
     )
-    return jax.tree.map(lambda a: jnp.asarray(a, dtype=jnp.float64), problem)
+
+
+def _float64(a: ArrayLike) -> jax.Array:
+    return jnp.asarray(a, dtype=jnp.float64)
 
 
 def for_channel(problem: Problem, c: int) -> Problem:

@@ -229,7 +229,7 @@ def _accumulate(
 
 
 def _sum_chunks(problem: Problem, chunk: Callable):
-    """Sum of ``chunk(rows)`` over blocks of rows, so that memory does not grow with them."""
+    """Sum of ``chunk(rows)`` over blocks of rows: memory does not grow with them."""
     rows = (
         problem.geometry,
         problem.kappa,
@@ -300,7 +300,7 @@ def _penalty_rows(problem: Problem, u: Array):
 
 
 def evaluate(problem: Problem, u: Array, x: Array, linearised: Bool[Array, ""]) -> Blocks:
-    """The blocks at ``(u, x)``; where the problem `resolves`, at the best ``x`` for ``u``."""
+    """The blocks at ``(u, x)``, or at the best ``x`` if the problem `resolves`."""
     a, da_dx, da_du = _amplitudes(problem, u, x)
     gram, gradient, cost = _accumulate(problem, u, a, linearised)
     gram = jnp.broadcast_to(gram, (x.shape[0], *gram.shape[1:]))
@@ -331,7 +331,7 @@ def evaluate(problem: Problem, u: Array, x: Array, linearised: Bool[Array, ""]) 
 
 
 def _columns(problem: Problem, a: Array, da_dx: Array, da_du: Array) -> tuple[Array, Array]:
-    """How the columns of the Jacobian are made of the features, ``(c, f, m)``, ``(c, f, k)``.
+    """How columns of the Jacobian follow from features, ``(c, f, m)`` and ``(c, f, k)``.
 
     A column of the shape is the derivatives of the basis functions, weighted by their
     amplitudes.
@@ -346,8 +346,8 @@ def _columns(problem: Problem, a: Array, da_dx: Array, da_du: Array) -> tuple[Ar
 
 
 def sum_over_rows(
-    problem: Problem, u: Array, x: Array, function: Callable[..., Array]
-) -> Array:
+    problem: Problem, u: Array, x: Array, function: Callable[..., tuple[Array, ...]]
+) -> tuple[Array, ...]:
     """Sum over blocks of rows of ``function(r, d, columns_x, columns_u)``.
 
     ``r, d (c, n)`` are residual and slope, ``columns_x (c, m, n)`` and ``columns_u

@@ -30,8 +30,9 @@ class Channel(msgspec.Struct, frozen=True):
 class ParameterResult(msgspec.Struct, frozen=True):
     """One parameter: one value if all channels share it, else one per channel.
 
-    ``standard_uncertainty`` (k = 1) is null where there is none: fixed, tied, at a bound,
-    or not determined by the data. ``support`` has null for an infinite end.
+    ``standard_uncertainty`` (k = 1) is null where there is none: fixed, at a bound, or not
+    determined by the data. ``interval_95`` is value -/+ Student's t times it, with the
+    effective degrees of freedom of the variance. ``support`` has null for an infinite end.
     """
 
     name: str
@@ -41,6 +42,7 @@ class ParameterResult(msgspec.Struct, frozen=True):
     support: tuple[float | None, float | None]
     value: list[float]
     standard_uncertainty: list[float | None]
+    interval_95: list[tuple[float, float] | None]
     at_bound: list[bool]
     fixed: bool
     tied_to: str | None

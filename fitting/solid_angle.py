@@ -92,12 +92,12 @@ def _azimuth_shares(phi: np.ndarray) -> np.ndarray:
 
 
 def _of_scattered(theta: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     points = np.stack(
         [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1
     )
     neighbours = min(5, theta.size)
-    distance, _ = cKDTree(points).query(points, k=neighbours)
+    distance, _ = KDTree(points).query(points, k=neighbours)
     area = np.mean(distance[:, 1:], axis=1) ** 2 + 1e-12
     return np.minimum(area, 4.0 * np.median(area))

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from fitting.model import Model
-from fitting.parameters import to_value
+from fitting.parameters import Scale, to_value
 from fitting.reduced import Problem
 from fitting.result import Correlations, ParameterResult, finite_or_none
 from fitting.solve import Solution
@@ -34,7 +34,8 @@ class Found:
         shape = unknowns.shape(jnp.asarray(self.solution.u))
         constant = np.asarray(unknowns.coefficient_constant)
         linear = [
-            unknowns.coefficients(x, constant[:, c]) for c, x in enumerate(self.solution.x)
+            unknowns.coefficients(jnp.asarray(x), jnp.asarray(constant[:, c]))
+            for c, x in enumerate(self.solution.x)
         ]
         own = {n: np.asarray(v) for n, v in shape.items()}
         return own | {
@@ -57,8 +58,10 @@ class _Errors:
 
     shape: np.ndarray
     shape_at_bound: np.ndarray
+    shape_freedom: np.ndarray
     coefficient: np.ndarray
     coefficient_at_bound: np.ndarray
+    coefficient_freedom: np.ndarray
     correlation: np.ndarray
 
 
@@ -70,10 +73,10 @@ def _errors(f: Found, cov: Covariance) -> _Errors:
     lower, upper = np.asarray(unknowns.lower), np.asarray(unknowns.upper)
     slope = np.array(
         [
-            float(jax.grad(lambda v, j=j: to_value(unknowns.scales[j], v, lower[j], upper[j]))(u[j]))
+            _slope(unknowns.scales[j], float(u[j]), float(lower[j]), float(upper[j]))
             for j in range(k)
         ]
-    )  # fmt: skip
+    )
     share = 1.0 / (1.0 + np.exp(-u))
     periodic = np.array([s == "periodic" for s in unknowns.scales], dtype=bool)
     shape_at = (np.minimum(share, 1 - share) < _AT_BOUND_SHARE) & ~periodic
@@ -100,12 +103,15 @@ def _errors(f: Found, cov: Covariance) -> _Errors:
         bad[i] = np.concatenate([shape_at, at[i]])
     per_channel = np.clip(per_channel, -1.0, 1.0)
     per_channel[bad[:, :, None] | bad[:, None, :]] = np.nan
+    freedom = np.asarray(cov.freedom)
     return _Errors(
-        np.where(shape_at, np.nan, sd_u),
-        shape_at,
-        np.where(at, np.nan, sd_x),
-        at,
-        per_channel,
+        shape=np.where(shape_at, np.nan, sd_u),
+        shape_at_bound=shape_at,
+        shape_freedom=freedom[c * m :],
+        coefficient=np.where(at, np.nan, sd_x),
+        coefficient_at_bound=at,
+        coefficient_freedom=freedom[: c * m].reshape(c, m),
+        correlation=per_channel,
     )
 
 
@@ -127,17 +133,22 @@ def parameters(
     )
     for name, declared in model.parameters().items():
         index, factor = sources[name]
+        low, high = declared.support
         value = np.atleast_1d(values[name])
         if index < 0:
-            sd, at = np.full(value.size, np.nan), np.zeros(value.size, dtype=bool)
+            sd, freedom = np.full(value.size, np.nan), np.ones(value.size)
+            at = np.zeros(value.size, dtype=bool)
         elif declared.coefficient:
             sd = np.concatenate([e.coefficient[:, index] for e in errors])
             at = np.concatenate([e.coefficient_at_bound[:, index] for e in errors])
+            freedom = np.concatenate([e.coefficient_freedom[:, index] for e in errors])
         else:
             sd = np.array([e.shape[index] for e in errors])
             at = np.array([e.shape_at_bound[index] for e in errors])
+            freedom = np.array([e.shape_freedom[index] for e in errors])
         if declared.scale == "periodic" and not declared.coefficient:
             value = np.mod(value - declared.support[0], np.ptp(declared.support))
+        sd = abs(factor) * sd
         free = free_linear if declared.coefficient else free_shape
         table.append(
             ParameterResult(
@@ -145,9 +156,10 @@ def parameters(
                 kind="coefficient" if declared.coefficient else "shape",
                 unit=declared.unit,
                 meaning=declared.meaning,
-                support=tuple(finite_or_none(s) for s in declared.support),
+                support=(finite_or_none(low), finite_or_none(high)),
                 value=[float(v) for v in value],
-                standard_uncertainty=[finite_or_none(abs(factor) * s) for s in sd],
+                standard_uncertainty=[finite_or_none(s) for s in sd],
+                interval_95=_intervals(value, sd, freedom),
                 at_bound=[bool(a) for a in at],
                 fixed=index < 0,
                 tied_to=free[index] if index >= 0 and free[index] != name else None,
@@ -159,6 +171,23 @@ def parameters(
         names, [[[finite_or_none(v) for v in row] for row in block] for block in blocks]
     )
     return table, correlations, _identifiability(table, names, blocks, channels)
+
+
+def _slope(scale: Scale, u: float, lower: float, upper: float) -> float:
+    ends = jnp.asarray(lower), jnp.asarray(upper)
+    return float(jax.grad(lambda v: to_value(scale, v, *ends))(u))
+
+
+def _intervals(
+    value: np.ndarray, sd: np.ndarray, freedom: np.ndarray
+) -> list[tuple[float, float] | None]:
+    from scipy.special import stdtrit
+
+    half = stdtrit(freedom, 0.975) * sd
+    return [
+        (float(v - h), float(v + h)) if np.isfinite(h) else None
+        for v, h in zip(value, half, strict=True)
+    ]
 
 
 def _masters(
@@ -186,8 +215,8 @@ def _identifiability(
         where = f"in {strong.size} of {len(channels)} channels" if len(channels) > 1 else ""
         out.append(
             f"{a} and {b} trade off {where}".rstrip()
-            + f" (correlation {pair[worst]:+.3f} at {channels[worst]}): their scaled {known} "
-            "is known, not their split"
+            + f" (correlation {pair[worst]:+.3f} at {channels[worst]}): "
+            f"their scaled {known} is known, not their split"
         )
     for p in table:
         if p.fixed or p.tied_to:

@@ -6,6 +6,11 @@ the outer products of every row's own gradient, all channels of a row together. 
 neither that the noise be the same everywhere nor that the channels of one row err
 independently; residuals are inflated by their leverage, ``r / (1 - h)`` (HC3, MacKinnon
 and White 1985), since the few rows on a peak pull the fit towards themselves.
+
+A variance that rests on few rows is itself uncertain. With the influence ``z_n`` of row n,
+of variance ``v_n``, the sum ``sum z_n^2`` has ``(sum v)^2 / sum v^2`` degrees of freedom
+(Satterthwaite 1946, Biometrics Bulletin 2, 110), estimated for Gaussian errors, where
+``E z^4 = 3 v^2``, by ``3 (sum z^2)^2 / sum z^4 - 2``.
 """
 
 from __future__ import annotations
@@ -24,12 +29,13 @@ from fitting.reduced import Problem
 class Covariance(NamedTuple):
     """Covariance of ``[x of channel 1, x of channel 2, ..., u]`` and active bounds.
 
-    ``information`` is the Gauss-Newton matrix of ``u`` with the coefficients eliminated.
+    ``freedom`` is the effective number of degrees of freedom of each variance, small where
+    a few rows decide about a parameter; intervals use Student's t with it.
     """
 
     matrix: Float[Array, "q q"]
+    freedom: Float[Array, " q"]
     active: Bool[Array, "c p"]
-    information: Float[Array, "k k"]
 
 
 @eqx.filter_jit
@@ -69,9 +75,12 @@ def covariance(
         in_x = (ex * inflated[:, None]).reshape(c * m, -1)
         return jnp.concatenate([in_x, jnp.sum(eu * inflated[:, None], axis=0)])
 
-    meat = reduced.sum_over_rows(problem, u, x, lambda *a: _outer(scores(*a)))
-    return Covariance(bread @ meat @ bread, solved.active, schur)
+    def moments(*columns: Array) -> tuple[Array, Array]:
+        influence = bread @ scores(*columns)
+        return influence @ influence.T, jnp.sum(influence**4, axis=1)
 
-
-def _outer(scores: Array) -> Array:
-    return scores @ scores.T
+    matrix, fourth = reduced.sum_over_rows(problem, u, x, moments)
+    variance = jnp.diagonal(matrix)
+    quotient = variance**2 / jnp.where(fourth > 0, fourth, 1.0)
+    freedom = jnp.where(fourth > 0, jnp.maximum(3.0 * quotient - 2.0, 1.0), jnp.inf)
+    return Covariance(matrix, freedom, solved.active)

@@ -1,0 +1,58 @@
+"""The command ``brdf``: one file per command, loaded when it is called.
+
+Exit codes: 0 good, 1 the fit did not converge (or `brdf doctor` found a problem), 2 usage,
+3 a file that cannot be read or written, 70 a bug, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Sequence
+
+__all__ = ["main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command line, without the program's name, and return the exit code."""
+    from fitting.cli import failures
+
+    tokens = list(sys.argv[1:] if argv is None else argv)
+    debug = "--debug" in tokens
+    if argv is None:
+        _prepare_process(debug)
+    try:
+        code = _run(tokens)
+        sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        print("brdf: interrupted; nothing was written", file=sys.stderr)
+        return failures.INTERRUPTED
+    except BrokenPipeError:
+        # The reader of a pipe, such as `head`, has seen enough.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return failures.GOOD
+    except Exception as error:  # The outermost edge: people get a sentence.
+        return failures.report(error, debug)
+
+
+def _run(tokens: list[str]) -> int:
+    from fitting.cli.application import application
+
+    code = application()(
+        tokens, exit_on_error=False, print_error=False, result_action="return_value"
+    )
+    return code if isinstance(code, int) else 0
+
+
+def _prepare_process(debug: bool) -> None:
+    """What concerns the whole process, and therefore is not done for callers of `main`."""
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            # A terminal that cannot show a character gets another one, not a traceback.
+            reconfigure(errors="replace")
+    if not debug and not sys.warnoptions:
+        # Warnings of libraries are for programmers; findings are in results and notes.
+        warnings.simplefilter("ignore")

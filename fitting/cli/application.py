@@ -1,0 +1,38 @@
+"""The commands by name; their modules are imported when they are called."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+from cyclopts import App
+
+_COMMANDS = {
+    "fit": "Fit models to a file of measured reflectance and judge the result.",
+    "info": "Say what is in a file: geometry, coverage, values, quality.",
+    "score": "Measure a fit result against a file, without fitting.",
+    "convert": "Write a file of measured reflectance in another format.",
+    "models": "List the models, or describe one in full.",
+    "formats": "List the file formats, or describe one in full.",
+    "doctor": "Check that the installation works.",
+}
+
+_EPILOGUE = """\
+Begin with `brdf fit`, which fits the bundled sample, or `brdf fit FILE`. Every command
+explains itself: `brdf fit --help`.
+
+Exit codes: 0 good, 1 the fit did not converge, 2 usage, 3 unreadable input.
+"""
+
+
+def application() -> App:
+    """The command line as a cyclopts application."""
+    app = App(
+        name="brdf",
+        help="Fit parametric reflectance models to goniometer files, with honest errors.",
+        help_epilogue=_EPILOGUE,
+        version=lambda: f"brdf {version('brdf-fitting')}",
+        suppress_keyboard_interrupt=False,
+    )
+    for order, (name, text) in enumerate(_COMMANDS.items()):
+        app.command(f"fitting.cli.{name}:{name}", name=name, help=text, sort_key=order)
+    return app

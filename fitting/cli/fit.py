@@ -1,0 +1,121 @@
+"""``brdf fit``: from a file to a model, its parameters and a verdict."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from fitting.cli import failures
+from fitting.cli.fit_choices import Choices
+from fitting.cli.flags import Flags
+
+if TYPE_CHECKING:
+    from fitting.cli.fit_settings import Job
+    from fitting.result import FitResult
+
+
+def fit(
+    file: Annotated[
+        Path | None,
+        Parameter(help="A file of measured reflectance. Without: the bundled sample."),
+    ] = None,
+    /,
+    *,
+    choices: Choices | None = None,
+    flags: Flags | None = None,
+) -> int:
+    """Fit models to a file of measured reflectance and judge the result.
+
+    Prints the parameters with standard uncertainties, the errors, what the data leave
+    open, and a verdict; writes everything to NAME.fit.json.
+
+        brdf fit paint.astm                            four common models compared
+        brdf fit paint.astm -m 'lambert + ggx'         one model
+        brdf fit paint.astm -m 'eon + ggx' --fix ggx.f90=1 --max-theta 75
+        brdf fit paint.astm --json > paint.json        for programs
+    """
+    flags = flags or Flags()
+    from fitting.cli.fit_settings import settle
+
+    job = settle(choices or Choices())
+    path = file or _sample()
+    target = _target(job, path)
+    if target is not None:
+        _check_target(target, path)
+
+    from fitting.cli import reading, terminal
+
+    measurement = reading.read_file(path, job.format, job.reader)
+    say = terminal.stderr()
+    if not flags.quiet and not job.json:
+        if file is None:
+            say.print("no FILE given: fitting the bundled sample, which is synthetic")
+        say.print(reading.headline(measurement, path), style="dim")
+
+    from fitting.cli import fit_run
+
+    done = fit_run.run(measurement, job, flags)
+    result = done.results[done.best]
+    if job.json:
+        text = result.to_json()
+    if target is not None:
+        result.save(target)
+    if job.json:
+        sys.stdout.write(text + "\n")
+    else:
+        from fitting.cli import fit_report
+
+        out = terminal.stdout()
+        fit_report.show(out, done, measurement, flags)
+        if target is not None:
+            out.print(f"\nwritten to {target}")
+    return _exit_code(result)
+
+
+def _sample() -> Path:
+    from fitting.sample import sample_path
+
+    return sample_path()
+
+
+def _target(job: Job, path: Path) -> Path | None:
+    """Where the result goes: beside nothing, into the current folder, unless told."""
+    from fitting.cli.reading import stem
+
+    if job.output is not None:
+        return job.output
+    return None if job.json else Path(f"{stem(path)}.fit.json")
+
+
+def _check_target(target: Path, source: Path) -> None:
+    """Before the work and not after it: can the result be written there?"""
+    import os
+
+    from fitting.result import ResultError, load_result
+
+    folder = target.parent
+    if not folder.is_dir():
+        raise failures.UsageError(f"{target}: the folder {folder} does not exist")
+    if target.is_dir():
+        raise failures.UsageError(f"{target}: is a folder; give the name of a file")
+    if not os.access(folder, os.W_OK):
+        raise failures.UsageError(
+            f"{target}: the folder {folder.resolve()} cannot be written to; choose another "
+            "place with -o"
+        )
+    if not target.exists():
+        return
+    try:
+        load_result(target)
+    except ResultError as error:
+        raise failures.UsageError(
+            f"{target}: exists and is not a fit result, so it is not overwritten; choose "
+            "another name with -o"
+        ) from error
+
+
+def _exit_code(result: FitResult) -> int:
+    return failures.GOOD if result.solver.converged else failures.NOT_CONVERGED

@@ -1,0 +1,62 @@
+"""Reading a file as a command does, and what to call it in the output."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fitting.cli.failures import UsageError
+
+if TYPE_CHECKING:
+    from data_formats import Measurement
+
+
+def read_file(
+    path: Path, format: str | None, reader: Mapping[str, Any] | None = None
+) -> Measurement:
+    """The measurement of a file; ``reader`` are options of the format's own reader."""
+    import data_formats
+
+    if format is not None:
+        known = [f.name for f in data_formats.formats()]
+        if format not in known:
+            raise UsageError(
+                f"--format {format}: there is no such format; known: {', '.join(known)}"
+            )
+    try:
+        return data_formats.read(path, format=format, **(reader or {}))
+    except TypeError as error:
+        if reader and "unexpected keyword argument" in str(error):
+            name = str(error).rpartition("'")[0].rpartition("'")[2]
+            raise UsageError(
+                f"--reader {name}: the reader of {path.name} has no such option; see "
+                "`brdf formats NAME`"
+            ) from error
+        raise
+
+
+def reader_options(module: Any) -> list[str]:
+    """Options of a format's reader, with type and default."""
+    parameters = inspect.signature(module.read).parameters.values()
+    return [str(p) for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY]
+
+
+def stem(path: Path) -> str:
+    """The name of a file without its suffix, and without ``.gz``."""
+    name = path.name.removesuffix(".gz")
+    return Path(name).stem or name
+
+
+def headline(measurement: Measurement, path: Path) -> str:
+    """One line on what the data are."""
+    from fitting.cli.quantities import channel_span, count
+
+    names = [c.name for c in measurement.channels]
+    sample = measurement.provenance.sample
+    about = f" ({sample})" if sample else ""
+    return (
+        f"{path.name}{about}: {count(measurement.n_rows, 'row')}, {channel_span(names)}, "
+        f"{measurement.symmetry}"
+    )
