@@ -25,6 +25,7 @@ class Beckmann(Lobe):
     NAME: ClassVar[str] = "beckmann"
     REFERENCE: ClassVar[str] = "Walter et al. 2007, eq. 20, 25 and 26; Heitz 2014, eq. 99"
     RECIPROCAL: ClassVar[bool] = True
+    LINEAR: ClassVar[bool] = True
     ALBEDO_BOUND: ClassVar[float | None] = 1.0
 
     anisotropic: bool = eqx.field(static=True, default=False)

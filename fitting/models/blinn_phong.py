@@ -25,6 +25,7 @@ class BlinnPhong(Lobe):
     NAME: ClassVar[str] = "blinn_phong"
     REFERENCE: ClassVar[str] = "Blinn 1977, normalised at normal incidence"
     RECIPROCAL: ClassVar[bool] = True
+    LINEAR: ClassVar[bool] = True
     ALBEDO_BOUND: ClassVar[float | None] = 1.0
 
     fresnel: fresnel.Fresnel = eqx.field(static=True, default="schlick")

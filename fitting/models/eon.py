@@ -33,6 +33,7 @@ class EON(Lobe):
     NAME: ClassVar[str] = "eon"
     REFERENCE: ClassVar[str] = "Portsmouth, Kutz and Hill 2025, JCGT 14(1)"
     RECIPROCAL: ClassVar[bool] = True
+    LINEAR: ClassVar[bool] = False
     ALBEDO_BOUND: ClassVar[float | None] = 1.0
 
     def parameters(self) -> tuple[Parameter, ...]:

@@ -24,6 +24,7 @@ class GGX(Lobe):
     NAME: ClassVar[str] = "ggx"
     REFERENCE: ClassVar[str] = "Walter et al. 2007, eq. 20 and 33; Heitz 2014, eq. 99"
     RECIPROCAL: ClassVar[bool] = True
+    LINEAR: ClassVar[bool] = True
     ALBEDO_BOUND: ClassVar[float | None] = 1.0
 
     anisotropic: bool = eqx.field(static=True, default=False)

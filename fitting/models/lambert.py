@@ -18,6 +18,7 @@ class Lambert(Lobe):
     NAME: ClassVar[str] = "lambert"
     REFERENCE: ClassVar[str] = "J. H. Lambert, Photometria, 1760"
     RECIPROCAL: ClassVar[bool] = True
+    LINEAR: ClassVar[bool] = True
     ALBEDO_BOUND: ClassVar[float | None] = 1.0
 
     def parameters(self) -> tuple[Parameter, ...]:

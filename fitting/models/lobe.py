@@ -32,6 +32,8 @@ class Lobe(eqx.Module):
     - ``NAME``: how users write it in a model expression.
     - ``REFERENCE``: the paper, to the equation number.
     - ``RECIPROCAL``: whether ``f(wi, wo) = f(wo, wi)`` for all parameters.
+    - ``LINEAR``: whether the amplitudes are the coefficients themselves, so that the best
+      coefficients of a quadratic objective follow from the shape in closed form.
     - ``ALBEDO_BOUND``: an upper bound of the directional albedo with the largest
       coefficient at 1, or None where there is none.
     """
@@ -39,6 +41,7 @@ class Lobe(eqx.Module):
     NAME: ClassVar[str]
     REFERENCE: ClassVar[str]
     RECIPROCAL: ClassVar[bool]
+    LINEAR: ClassVar[bool]
     ALBEDO_BOUND: ClassVar[float | None]
 
     @abc.abstractmethod

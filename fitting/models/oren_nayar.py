@@ -25,6 +25,7 @@ class OrenNayar(Lobe):
     NAME: ClassVar[str] = "oren_nayar"
     REFERENCE: ClassVar[str] = "Oren and Nayar 1994, the qualitative model"
     RECIPROCAL: ClassVar[bool] = True
+    LINEAR: ClassVar[bool] = True
     ALBEDO_BOUND: ClassVar[float | None] = 1.0152
 
     def parameters(self) -> tuple[Parameter, ...]:
