@@ -1,8 +1,8 @@
-"""`Measurement`: directions, BSDF values and what is known about them, as read from a file."""
+"""`Measurement`: directions, BSDF values and what is known about them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -121,7 +121,7 @@ class Measurement:
     channels: tuple[Channel, ...]
     sigma: NDArray[np.float64] | None = None
     symmetry: Symmetry = "isotropic"
-    provenance: Provenance = Provenance()  # noqa: RUF009 - frozen
+    provenance: Provenance = Provenance()
     notes: tuple[Note, ...] = ()
     auxiliary: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
@@ -130,7 +130,9 @@ class Measurement:
         self._set("notes", tuple(self.notes))
         if self.symmetry not in get_args(Symmetry):
             known = ", ".join(get_args(Symmetry))
-            raise MeasurementError(f"symmetry is {self.symmetry!r}; expected one of {known}")
+            raise MeasurementError(
+                f"symmetry is {self.symmetry!r}; expected one of {known}"
+            )
         _check_channels(self.channels)
 
         self._set("theta_i", _frozen("theta_i", self.theta_i, None))
@@ -142,14 +144,18 @@ class Measurement:
         self._set("valid", _frozen("valid", self.valid, table, np.bool_))
         wrong = int(np.count_nonzero(self.valid & ~np.isfinite(self.value)))
         if wrong:
-            raise MeasurementError(f"value is not finite in {wrong} entries marked as valid")
+            raise MeasurementError(
+                f"value is not finite in {wrong} entries marked as valid"
+            )
+        # Masked entries are a number or NaN: one way to say "unknown".
+        self._set("value", _frozen("value", _finite_or_nan(self.value), table))
         if self.sigma is not None:
             self._set("sigma", _frozen("sigma", self.sigma, table))
             usable = (self.sigma > 0) & np.isfinite(self.sigma)
             wrong = int(np.count_nonzero(self.valid & ~usable))
             if wrong:
                 raise MeasurementError(
-                    f"sigma is not a positive number in {wrong} entries marked as valid"
+                    f"sigma is not a positive number in {wrong} valid entries"
                 )
         columns = {k: _frozen(k, v, rows) for k, v in self.auxiliary.items()}
         if unnamed := [k for k in columns if not k.strip() or not k.isprintable()]:
@@ -213,7 +219,14 @@ class Measurement:
 
     def _arrays(self) -> list[NDArray[Any]]:
         """All arrays, in an order that does not depend on that of `auxiliary`."""
-        arrays = [self.theta_i, self.phi_i, self.theta_r, self.phi_r, self.value, self.valid]
+        arrays = [
+            self.theta_i,
+            self.phi_i,
+            self.theta_r,
+            self.phi_r,
+            self.value,
+            self.valid,
+        ]
         arrays += [] if self.sigma is None else [self.sigma]
         return arrays + [self.auxiliary[name] for name in sorted(self.auxiliary)]
 
@@ -236,15 +249,23 @@ def _frozen(
     return copy
 
 
+def _finite_or_nan(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(np.isfinite(array), array, np.nan)
+
+
 def _check_channels(channels: tuple[Channel, ...]) -> None:
     if not channels:
         raise MeasurementError("there is no channel; expected at least one")
-    names = [c.name for c in channels]
-    wavelengths = [c.wavelength_nm for c in channels if c.wavelength_nm is not None]
-    for seen in (names, wavelengths):
-        if twice := [x for i, x in enumerate(seen) if x in seen[:i]]:
-            unit = "" if seen is names else " nm"
-            raise MeasurementError(f"two channels are called {twice[0]}{unit}")
+    _check_distinct("name", [c.name for c in channels])
+    _check_distinct(
+        "wavelength", [c.wavelength_nm for c in channels if c.wavelength_nm is not None]
+    )
+
+
+def _check_distinct(what: str, found: Sequence[object]) -> None:
+    if len(set(found)) < len(found):
+        twice = next(x for x in found if found.count(x) > 1)
+        raise MeasurementError(f"two channels have the {what} {twice}")
 
 
 def _check_angle(name: str, angle: NDArray[np.float64]) -> None:

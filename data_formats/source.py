@@ -5,7 +5,6 @@ from __future__ import annotations
 import gzip
 import hashlib
 import os
-import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -60,8 +59,13 @@ class Source:
                 f"{self.path}: the file has NUL bytes, so it is not a text table; "
                 f"it begins with {self.data[:24]!r}"
             )
-        # Not splitlines(): it also breaks at characters that occur inside comments.
-        return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        return split_lines(text)
+
+
+def split_lines(text: str) -> list[str]:
+    """Lines of a text, whatever the line ends: LF, CR LF or CR."""
+    # Not splitlines(): it also breaks at characters that occur inside comments.
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def load(path: str | os.PathLike[str]) -> Source:
@@ -79,9 +83,9 @@ def load(path: str | os.PathLike[str]) -> Source:
         if size > MAX_BYTES:
             raise MeasurementError(f"{name}: {size} bytes is more than the 2 GiB accepted")
         data = Path(name).read_bytes()
+    except MeasurementError:
+        raise
     except (OSError, ValueError) as error:
-        if isinstance(error, MeasurementError):
-            raise
         reason = getattr(error, "strerror", None) or error
         raise MeasurementError(f"{name}: the file cannot be read: {reason}") from error
     digest = hashlib.sha256(data).hexdigest()
@@ -119,18 +123,16 @@ def _unpack(name: str, data: bytes) -> bytes:
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A new file beside `path` that takes its place when the block ends without error.
+    """A name beside `path`; the file written there takes its place if nothing went wrong.
 
     **Raises:** `MeasurementError` if the file cannot be written.
     """
     target = Path(path)
+    # The name's end is kept: `.gz` asks for compression.
+    beside = target.with_name(f".{os.getpid()}.{target.name}")
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name[:64]}.", dir=target.parent)
-        os.close(handle)
-        beside = Path(name)
         try:
             yield beside
-            _take_mode(beside, target)
             os.replace(beside, target)
         finally:
             beside.unlink(missing_ok=True)
@@ -139,20 +141,9 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise MeasurementError(f"{target}: the file cannot be written: {reason}") from error
 
 
-def _take_mode(beside: Path, target: Path) -> None:
-    """Permissions as an ordinary new file would have, instead of a temporary file's."""
-    if target.exists():
-        beside.chmod(target.stat().st_mode & 0o777)
-        return
-    mask = os.umask(0)
-    os.umask(mask)
-    beside.chmod(0o666 & ~mask)
-
-
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write UTF-8 text with LF line ends in one piece; packed if the name ends in `.gz`."""
-    data = text.encode("utf-8", errors="surrogateescape")
+    """Write UTF-8 text with LF line ends; compressed if the name ends in `.gz`."""
+    data = text.encode("utf-8")
     if os.fspath(path).lower().endswith(".gz"):
         data = gzip.compress(data, mtime=0)
-    with replacing(path) as beside:
-        beside.write_bytes(data)
+    Path(path).write_bytes(data)

@@ -1,0 +1,44 @@
+"""Formats that are recognised by content, and refused by name instead of misread."""
+
+from __future__ import annotations
+
+import re
+
+# (what it is, a pattern that its first bytes match)
+_KNOWN: tuple[tuple[str, re.Pattern[bytes]], ...] = tuple(
+    (name, re.compile(pattern, re.MULTILINE))
+    for name, pattern in (
+        ("a tensor_file container (RGL .bsdf, KAIST .pbsdf)", rb"\Atensor_file\0"),
+        (
+            "a MERL table (.binary)",
+            rb"\A\x5a\0\0\0\x5a\0\0\0(?:\xb4\0\0\0|\x68\x01\0\0)",
+        ),
+        ("a Fourier BSDF (SCATFUN)", rb"\ASCATFUN"),
+        ("an NVIDIA ARC MBSDF file", rb"\ANVIDIA ARC MBSDF"),
+        (
+            "a BSDF XML file (WindowElement)",
+            rb"\A(?:\xef\xbb\xbf)?\s*<(?s:.*)<WindowElement",
+        ),
+        ("an ALTA data file (#DIM)", rb"^#DIM\b"),
+        ("an ALTA function file (#FUNC)", rb"^#FUNC\b"),
+        ("a Zemax BSDF file (AngleOfIncidence)", rb"^[ \t]*AngleOfIncidence[ \t]+\d"),
+        ("a LightTools BSDF file (ScatterRadial)", rb"^[ \t]*ScatterRadial[ \t]+\d"),
+        ("a FRED table (type bsdf_data)", rb"^[ \t]*type[ \t]+bsdf_data"),
+        ("an RPC Photonics table (!!BSDF Data)", rb"^!!BSDF Data"),
+        ("a Speos / OPTIS file", rb"\A(?:\xef\xbb\xbf)?OPTIS - "),
+        ("an SSDD file (DATA_TYPE)", rb"^DATA_TYPE[ \t]+(?:brdf|btdf|specular)"),
+        ("a pgII scan of pab-opto", rb"^#(?:intheta|incident_angle|theta_in|format:)"),
+        (
+            "a Disney BRDF Explorer function (GLSL, no measurement)",
+            rb"\A\s*(?:analytic\b|::begin)",
+        ),
+        ("an OpenEXR image", rb"\A\x76\x2f\x31\x01"),
+        ("a ZIP archive or .xlsx workbook: export it as CSV", rb"\APK\x03\x04"),
+        ("an Excel workbook: export it as CSV", rb"\A\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"),
+    )
+)
+
+
+def recognise(head: bytes) -> str | None:
+    """What a file is, if it is one of these formats; `head` is its first 64 kB."""
+    return next((name for name, pattern in _KNOWN if pattern.search(head)), None)

@@ -1,0 +1,100 @@
+"""The batched quadratic program against scipy."""
+
+from __future__ import annotations
+
+import jax
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import lsq_linear, nnls
+
+from fitting import qp
+
+
+def problems(seed: int, m: int, channels: int = 7, rows: int = 60):
+    """Correlated columns of very different size, as basis functions have."""
+    rng = np.random.default_rng(seed)
+    a = rng.normal(size=(channels, rows, m)) + 3.0 * rng.normal(size=(channels, rows, 1))
+    a *= 10.0 ** rng.uniform(-3, 3, size=m)
+    y = rng.normal(size=(channels, rows))
+    return a, y, np.einsum("cni,cnj->cij", a, a), np.einsum("cni,cn->ci", a, y)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), m=st.sampled_from([1, 3, 5]))
+def test_non_negative_least_squares(seed, m):
+    a, y, hessian, linear = problems(seed, m)
+    with jax.enable_x64(True):
+        out = qp.solve(hessian, linear, np.eye(m), np.zeros((7, m)))
+    for c in range(7):
+        x, residual = nnls(a[c], y[c])
+        ours = np.linalg.norm(a[c] @ np.asarray(out.x[c]) - y[c])
+        assert np.all(np.asarray(out.x[c]) >= 0)
+        assert ours <= residual * (1 + 1e-10)
+        np.testing.assert_array_equal(np.asarray(out.x[c]) == 0, x == 0)
+
+
+def test_upper_and_lower_bounds():
+    a, y, hessian, linear = problems(3, 4)
+    size = np.abs(np.linalg.solve(hessian, linear[..., None])[..., 0]).max(axis=0)
+    low, high = -0.05 * size, 0.1 * size
+    rows = np.vstack([np.eye(4), -np.eye(4)])
+    limits = np.tile(np.concatenate([low, -high]), (7, 1))
+    with jax.enable_x64(True):
+        out = qp.solve(hessian, linear, rows, limits)
+    for c in range(7):
+        best = lsq_linear(a[c], y[c], (low, high), tol=1e-14)
+        ours = a[c] @ np.asarray(out.x[c]) - y[c]
+        assert 0.5 * ours @ ours <= best.cost * (1 + 1e-9)
+        assert np.all(np.asarray(out.x[c]) >= low * (1 + 1e-12))
+        assert np.all(np.asarray(out.x[c]) <= high * (1 + 1e-12))
+
+
+def test_sum_constraint_is_kept_and_its_inverse_is_the_constrained_one():
+    """With sum(x) <= s active, the inverse is that of the Hessian on sum(dx) = 0."""
+    _, _, hessian, linear = problems(5, 3)
+    free = np.linalg.solve(hessian, linear[..., None])[..., 0]
+    weights = 1.0 / np.abs(free).max(axis=0)
+    limit = -np.abs(0.5 * free @ weights) - 1e-3
+    rows, limits = -weights[None], limit[:, None]
+    with jax.enable_x64(True):
+        out = qp.solve(hessian, linear, rows, limits)
+    x = np.asarray(out.x)
+    assert np.all(rows @ x.T >= limits.T - 1e-9)
+    basis = np.linalg.svd(weights[None])[2][1:].T
+    for c in np.flatnonzero(np.asarray(out.active)[:, 0]):
+        exact = basis @ np.linalg.inv(basis.T @ hessian[c] @ basis) @ basis.T
+        np.testing.assert_allclose(
+            out.inverse[c], exact, rtol=2e-3, atol=1e-6 * exact.max()
+        )
+    assert np.asarray(out.active).any()
+
+
+def test_without_constraints_it_is_the_plain_solution():
+    _, _, hessian, linear = problems(8, 5)
+    with jax.enable_x64(True):
+        out = qp.solve(hessian, linear, np.zeros((0, 5)), np.zeros((7, 0)))
+    exact = np.linalg.solve(hessian, linear[..., None])[..., 0]
+    np.testing.assert_allclose(out.x, exact, rtol=1e-7)
+    np.testing.assert_allclose(out.inverse, np.linalg.inv(hessian), rtol=1e-6)
+
+
+def test_a_basis_that_vanishes_leaves_its_coefficient_at_the_bound():
+    _, _, hessian, linear = problems(2, 3)
+    hessian[:, 1] = hessian[:, :, 1] = 0.0
+    linear[:, 1] = 0.0
+    with jax.enable_x64(True):
+        out = qp.solve(hessian, linear, np.eye(3), np.zeros((7, 3)))
+    assert np.all(np.isfinite(out.x))
+    np.testing.assert_allclose(np.asarray(out.x)[:, 1], 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("m", [1, 2, 6])
+def test_inverse_by_sweeping(m):
+    _, _, hessian, _ = problems(1, m)
+    scale = 1.0 / np.sqrt(np.einsum("cii->ci", hessian))
+    unit = hessian * scale[:, :, None] * scale[:, None, :]
+    with jax.enable_x64(True):
+        product = np.asarray(qp.inverse(unit)) @ unit
+    np.testing.assert_allclose(product, np.tile(np.eye(m), (7, 1, 1)), atol=1e-9)
