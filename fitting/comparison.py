@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,13 +14,15 @@ from fitting.fitter import Progress, fit
 from fitting.options import FitOptions
 from fitting.result import FitResult
 
-# What is tried when the user names no model: diffuse plus one lobe with long, short and
-# bounded skirts, and a second lobe for surfaces of two scales.
+# What is tried when the user names no model: diffuse plus one lobe with long skirts, with
+# short ones, or without the 1/(cos cos) of a facet on air (flakes below a clear coat); and
+# two lobes, for surfaces of two scales and for flakes below a coat that shines itself.
 DEFAULT_MODELS = (
     "lambert + ggx",
-    "lambert + beckmann",
     "lambert + ward",
+    "lambert + blinn_phong",
     "lambert + 2*ggx",
+    "lambert + ggx + blinn_phong",
 )
 
 
@@ -52,10 +55,15 @@ def compare(
     Breiman et al. 1984, Classification and Regression Trees, sec. 3.4.3, paired).
     """
     say = progress or (lambda _: None)
-    results = tuple(
-        fit(measurement, m, options, progress=lambda s, m=m: say(f"{m}: {s}"), **settings)
-        for m in models
-    )
+
+    def one(model: str) -> FitResult:
+        return fit(
+            measurement, model, options, progress=lambda s: say(f"{model}: {s}"), **settings
+        )
+
+    # Two at a time: what takes long is compiling, which leaves Python's lock.
+    with ThreadPoolExecutor(max_workers=min(2, len(models))) as pool:
+        results = tuple(pool.map(one, models))
     best, reason = choose(results)
     return Comparison(results, best, reason)
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -101,7 +102,7 @@ def _fit(
         found = _again(rows, model, options, found, robust_width=width, penalised=True)
         energy_active = wants_energy
     say("uncertainties")
-    covariances = [covariance(f.problem, f.solution.u, f.solution.x) for f in found]
+    covariances = [covariance(f.problem, f.solution) for f in found]
     values = joined_values(found)
     predicted = predict_geometry(model, values, rows.geometry)
     predicted = np.broadcast_to(predicted, rows.value.shape)
@@ -194,21 +195,25 @@ def _worst_albedo(model: Model, found: list[Found]) -> tuple[float, float, int]:
     """Largest directional albedo, its polar angle in deg, and the channel, densely."""
     theta = np.concatenate([np.arange(0.0, 80.0, 4.0), np.arange(80.0, 90.0, 0.5)])
     cosines = jnp.asarray(np.cos(np.radians(theta)))
-    azimuths = (0.0, 45.0, 90.0, 135.0) if model.anisotropic else (0.0,)
+    azimuths = np.radians([0.0, 45.0, 90.0, 135.0] if model.anisotropic else [0.0])
     worst = (-math.inf, 0.0, 0)
     channel = 0
     for f in found:
         for azimuth in azimuths:
             e = np.asarray(
-                model_albedo(
-                    model, f.values(), cosines,
-                    azimuth=math.radians(azimuth), nodes=_DENSE_NODES,
-                )
-            ).reshape(theta.size, -1)  # fmt: skip
+                _dense_albedo(model, f.values(), cosines, jnp.asarray(azimuth))
+            ).reshape(theta.size, -1)
             k, c = np.unravel_index(int(np.argmax(e)), e.shape)
             worst = max(worst, (float(e[k, c]), float(theta[k]), channel + int(c)))
         channel += f.solution.x.shape[0]
     return worst
+
+
+@eqx.filter_jit
+def _dense_albedo(
+    model: Model, values: dict[str, Any], cosines: jax.Array, azimuth: jax.Array
+) -> jax.Array:
+    return model_albedo(model, values, cosines, azimuth=azimuth, nodes=_DENSE_NODES)
 
 
 def _reciprocity(

@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jax import Array
 
+AnyArray = TypeVar("AnyArray", Array, np.ndarray, float)
 Scale = Literal["log", "linear", "periodic"]
 
 
@@ -73,20 +75,31 @@ def coefficient(
     return Parameter(name, default, support, unit, meaning, coefficient=True)
 
 
-def to_value(
-    scale: Scale, u: Float[Array, ""], lower: Float[Array, ""], upper: Float[Array, ""]
-) -> Float[Array, ""]:
-    """Value in the support for a point ``u`` of the real line.
+def to_value(scale: Scale, u: AnyArray, lower: AnyArray, upper: AnyArray) -> AnyArray:
+    """Value in the support for a point ``u`` of the real line; numpy or JAX.
 
     ``linear``: ``lower + (upper - lower) sigmoid(u)``; ``log``: the same in the logarithm;
     ``periodic``: ``u`` itself.
     """
     if scale == "periodic":
         return u
-    share = jax.nn.sigmoid(u)
+    traced = isinstance(u, Array)
+    lib: Any = jnp if traced else np
+    share: Any = jax.nn.sigmoid(u) if traced else 1.0 / (1.0 + np.exp(-u))
     if scale == "log":
-        return lower * jnp.exp(jnp.log(upper / lower) * share)
+        return lower * lib.exp(lib.log(upper / lower) * share)
     return lower + (upper - lower) * share
+
+
+def slope_of_value(scale: Scale, u: float, lower: float, upper: float) -> float:
+    """Derivative of `to_value` in ``u``."""
+    if scale == "periodic":
+        return 1.0
+    share = 1.0 / (1.0 + math.exp(-u))
+    width = upper - lower
+    if scale == "log":
+        width = math.log(upper / lower) * float(to_value(scale, u, lower, upper))
+    return width * share * (1.0 - share)
 
 
 def to_real_line(scale: Scale, value: float, lower: float, upper: float) -> float:

@@ -26,11 +26,12 @@ _FIRST_DAMPING = 1e-3
 
 
 class Solution(NamedTuple):
-    """Where a start ended: unknowns, sum of squares, and how it got there."""
+    """Where a start ended: unknowns, the blocks there, and how it got there."""
 
     u: Float[Array, " k"]
     x: Float[Array, "c m"]
     cost: Float[Array, ""]
+    blocks: Blocks
     steps: Int[Array, ""]
     converged: Bool[Array, ""]
 
@@ -94,7 +95,7 @@ class ArrowLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
 
     def postprocess(self, fn, y, aux, args, options, state, tags, result):
         del fn, y, args, options, tags, result
-        return state.at, aux, {"cost": state.accepted.cost}
+        return state.at, aux, {"blocks": state.accepted}
 
 
 def propose(
@@ -180,7 +181,7 @@ def refine(problem: Problem, u0: Float[Array, " k"], x0: Float[Array, "c m"]) ->
     )  # fmt: skip
     u, x = out.value
     return Solution(
-        u, x, out.stats["cost"], out.stats["num_steps"],
+        u, x, out.stats["blocks"].cost, out.stats["blocks"], out.stats["num_steps"],
         out.result == optx.RESULTS.successful,
     )  # fmt: skip
 

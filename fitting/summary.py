@@ -6,11 +6,10 @@ import dataclasses
 import itertools
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from fitting.model import Model
-from fitting.parameters import Scale, to_value
+from fitting.parameters import slope_of_value
 from fitting.reduced import Problem
 from fitting.result import Correlations, ParameterResult, finite_or_none
 from fitting.solve import Solution
@@ -29,13 +28,13 @@ class Found:
     costs: tuple[float, ...]
 
     def values(self) -> dict[str, np.ndarray]:
-        """All parameters by name; coefficients ``(c,)``."""
-        unknowns = self.problem.unknowns
-        shape = unknowns.shape(jnp.asarray(self.solution.u))
+        """All parameters by name; coefficients ``(c,)``. In numpy: nothing to compile."""
+        unknowns = jax.device_get(self.problem.unknowns)
+        shape = unknowns.shape(np.asarray(self.solution.u))
         constant = np.asarray(unknowns.coefficient_constant)
         linear = [
-            unknowns.coefficients(jnp.asarray(x), jnp.asarray(constant[:, c]))
-            for c, x in enumerate(self.solution.x)
+            unknowns.coefficients(x, c)
+            for x, c in zip(np.asarray(self.solution.x), constant.T, strict=True)
         ]
         own = {n: np.asarray(v) for n, v in shape.items()}
         return own | {
@@ -73,7 +72,7 @@ def _errors(f: Found, cov: Covariance) -> _Errors:
     lower, upper = np.asarray(unknowns.lower), np.asarray(unknowns.upper)
     slope = np.array(
         [
-            _slope(unknowns.scales[j], float(u[j]), float(lower[j]), float(upper[j]))
+            slope_of_value(unknowns.scales[j], float(u[j]), lower[j], upper[j])
             for j in range(k)
         ]
     )
@@ -171,11 +170,6 @@ def parameters(
         names, [[[finite_or_none(v) for v in row] for row in block] for block in blocks]
     )
     return table, correlations, _identifiability(table, names, blocks, channels)
-
-
-def _slope(scale: Scale, u: float, lower: float, upper: float) -> float:
-    ends = jnp.asarray(lower), jnp.asarray(upper)
-    return float(jax.grad(lambda v: to_value(scale, v, *ends))(u))
 
 
 def _intervals(

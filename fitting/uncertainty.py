@@ -20,10 +20,15 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+import numpy as np
+import scipy.linalg
+from jaxtyping import Array, Float
 
-from fitting import qp, reduced
+from fitting import reduced
 from fitting.reduced import Problem
+from fitting.solve import Solution
+
+_ON_BOUND = 1e-9
 
 
 class Covariance(NamedTuple):
@@ -33,54 +38,83 @@ class Covariance(NamedTuple):
     a few rows decide about a parameter; intervals use Student's t with it.
     """
 
-    matrix: Float[Array, "q q"]
-    freedom: Float[Array, " q"]
-    active: Bool[Array, "c p"]
+    matrix: np.ndarray
+    freedom: np.ndarray
+    active: np.ndarray
+
+
+def covariance(problem: Problem, end: Solution) -> Covariance:
+    """Sandwich covariance at a minimum; coefficients on a bound count as known."""
+    b = jax.device_get(end.blocks)
+    c, m, k = b.h_xu.shape
+    active, inverse = _on_free_directions(problem, np.asarray(end.x), b.h_xx)
+    response = inverse @ b.h_xu
+    schur = b.h_uu - np.einsum("cmk,cml->kl", b.h_xu, response)
+    schur_inverse = _inverse(schur)
+    spread = np.concatenate([-response.reshape(c * m, k), np.eye(k)])
+    bread = spread @ schur_inverse @ spread.T
+    for i in range(c):
+        own = slice(i * m, (i + 1) * m)
+        bread[own, own] += inverse[i]
+    u, x = jnp.asarray(end.u), jnp.asarray(end.x)
+    moments = _moments(problem, u, x, jnp.asarray(bread))
+    matrix, fourth = (np.asarray(v) for v in moments)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        quotient = np.diag(matrix) ** 2 / fourth
+    freedom = np.where(fourth > 0, np.maximum(3.0 * quotient - 2.0, 1.0), np.inf)
+    return Covariance(matrix, freedom, active)
 
 
 @eqx.filter_jit
-def covariance(
-    problem: Problem, u: Float[Array, " k"], x: Float[Array, "c m"]
-) -> Covariance:
-    """Sandwich covariance at a minimum; coefficients on a bound count as known."""
-    no = jnp.asarray(False)
-    b = reduced.evaluate(problem, u, x, no)
-    unknowns = problem.unknowns
+def _moments(
+    problem: Problem,
+    u: Float[Array, " k"],
+    x: Float[Array, "c m"],
+    bread: Float[Array, "q q"],
+) -> tuple[Array, ...]:
+    """Sums over rows of the outer product and the fourth power of their influence."""
     c, m, k = *x.shape, u.shape[0]
-    solved = qp.solve(b.h_xx, qp.product(b.h_xx, x) - b.g_x, unknowns.rows, unknowns.limits)
-    inverse = solved.inverse
-    response = jnp.einsum("cmn,cnk->cmk", inverse, b.h_xu)
-    schur = b.h_uu - jnp.einsum("cmk,cml->kl", b.h_xu, response)
-    schur_inverse = qp.inverse(schur) if k else schur
-
-    spread = jnp.concatenate([-response.reshape(c * m, k), jnp.eye(k, dtype=u.dtype)])
-    bread = spread @ schur_inverse @ spread.T
-    blocks = jnp.zeros((c, m, c, m), u.dtype)
-    blocks = blocks.at[jnp.arange(c), :, jnp.arange(c), :].set(inverse)
-    bread = bread.at[: c * m, : c * m].add(blocks.reshape(c * m, c * m))
-
-    own = jax.vmap(
-        lambda i: jax.lax.dynamic_slice(bread, (i * m, i * m), (m, m))
-    )(jnp.arange(c))  # fmt: skip
+    channels = jnp.arange(c)
+    by_channel = bread[: c * m, : c * m].reshape(c, m, c, m)[channels, :, channels]
     cross = bread[: c * m, c * m :].reshape(c, m, k)
+    shared = bread[c * m :, c * m :]
 
-    def scores(r: Array, d: Array, columns_x: Array, columns_u: Array) -> Array:
+    def moments(r: Array, d: Array, columns_x: Array, columns_u: Array):
         ex, eu = d[:, None] * columns_x, d[:, None] * columns_u
         leverage = (
-            jnp.einsum("cmn,cmp,cpn->cn", ex, own, ex)
+            jnp.einsum("cmn,cmp,cpn->cn", ex, by_channel, ex)
             + 2.0 * jnp.einsum("cmn,cmk,ckn->cn", ex, cross, eu)
-            + jnp.einsum("ckn,kl,cln->cn", eu, schur_inverse, eu)
+            + jnp.einsum("ckn,kl,cln->cn", eu, shared, eu)
         )
-        inflated = r / (1.0 - jnp.clip(leverage, 0.0, 0.999))
-        in_x = (ex * inflated[:, None]).reshape(c * m, -1)
-        return jnp.concatenate([in_x, jnp.sum(eu * inflated[:, None], axis=0)])
-
-    def moments(*columns: Array) -> tuple[Array, Array]:
-        influence = bread @ scores(*columns)
+        inflated = (r / (1.0 - jnp.clip(leverage, 0.0, 0.999)))[:, None]
+        scores = jnp.concatenate(
+            [(ex * inflated).reshape(c * m, -1), jnp.sum(eu * inflated, axis=0)]
+        )
+        influence = bread @ scores
         return influence @ influence.T, jnp.sum(influence**4, axis=1)
 
-    matrix, fourth = reduced.sum_over_rows(problem, u, x, moments)
-    variance = jnp.diagonal(matrix)
-    quotient = variance**2 / jnp.where(fourth > 0, fourth, 1.0)
-    freedom = jnp.where(fourth > 0, jnp.maximum(3.0 * quotient - 2.0, 1.0), jnp.inf)
-    return Covariance(matrix, freedom, solved.active)
+    return reduced.sum_over_rows(problem, u, x, moments)
+
+
+def _on_free_directions(
+    problem: Problem, x: np.ndarray, hessian: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which constraints hold with equality, and the inverse Hessian on what is left."""
+    rows = np.asarray(problem.unknowns.rows)
+    limits = np.asarray(problem.unknowns.limits)
+    slack = x @ rows.T - limits
+    active = slack <= _ON_BOUND * np.maximum(np.abs(limits), 1e-3)
+    inverse = np.zeros_like(hessian)
+    for i, (own, h) in enumerate(zip(active, hessian, strict=True)):
+        free = scipy.linalg.null_space(rows[own]) if own.any() else np.eye(h.shape[0])
+        inverse[i] = free @ _inverse(free.T @ h @ free) @ free.T
+    return active, inverse
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse after scaling to a unit diagonal; a tiny ridge keeps it finite."""
+    if not matrix.size:
+        return matrix
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    unit = matrix * np.outer(scale, scale) + 1e-14 * np.eye(scale.size)
+    return np.linalg.inv(unit) * np.outer(scale, scale)
