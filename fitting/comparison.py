@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,9 +60,7 @@ def compare(
             measurement, model, options, progress=lambda s: say(f"{model}: {s}"), **settings
         )
 
-    # Two at a time: what takes long is compiling, which leaves Python's lock.
-    with ThreadPoolExecutor(max_workers=min(2, len(models))) as pool:
-        results = tuple(pool.map(one, models))
+    results = tuple(one(model) for model in models)
     best, reason = choose(results)
     return Comparison(results, best, reason)
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from data_formats import Measurement
 from fitting.solid_angle import incidence_labels, solid_angles
+
+_SAME_DIRECTION = 1e-3
+_WIDEST_GAP = np.radians(20.0)
 
 
 def data_albedo(m: Measurement) -> list[tuple[float, float, float]]:
@@ -40,34 +45,25 @@ def data_reciprocity(m: Measurement) -> tuple[float, int] | None:
 
     For every pair of measured polar angles of incidence ``a, b`` and azimuth differences,
     the table of ``a`` is interpolated linearly at ``theta_r = b`` and the other way round,
-    over the mean of the channels. None where the sampling does not allow it.
+    over the mean of the channels. Gaps of more than 20 deg are not bridged. None where the
+    sampling leaves no pair.
     """
-    from scipy.interpolate import LinearNDInterpolator
-    from scipy.spatial import QhullError
-
     up = (m.theta_r <= 0.5 * np.pi) & m.valid.any(axis=1)
     label = incidence_labels(m.theta_i)
     count = np.maximum(m.valid.sum(axis=1), 1)
     mean = np.where(m.valid, m.value, 0.0).sum(axis=1) / count
     azimuth = np.radians(np.arange(0.0, 181.0, 10.0))
-    tables: list[tuple[float, LinearNDInterpolator]] = []
+    tables: list[tuple[float, _Rings]] = []
     for k in np.unique(label[up]):
         rows = np.flatnonzero(up & (label == k))
-        delta = m.phi_r[rows] - m.phi_i[rows]
-        x, y = _plane(m.theta_r[rows], delta)
-        points, first = np.unique(
-            np.round(np.stack([x, y], axis=1), 9), axis=0, return_index=True
-        )
-        try:
-            table = LinearNDInterpolator(points, mean[rows][first])
-        except (QhullError, ValueError):
-            continue
+        # Both halves folded onto one: isotropic data are compared as if symmetric.
+        delta = np.abs(np.arctan2(*_sin_cos(m.phi_r[rows] - m.phi_i[rows])))
+        table = _Rings.of(m.theta_r[rows], delta, mean[rows])
         tables.append((float(m.theta_i[rows].mean()), table))
     differences: list[np.ndarray] = []
     for i, (a, of_a) in enumerate(tables):
         for b, of_b in tables[i + 1 :]:
-            there = of_a(*_plane(np.full(azimuth.size, b), azimuth))
-            back = of_b(*_plane(np.full(azimuth.size, a), azimuth))
+            there, back = of_a.at(b, azimuth), of_b.at(a, azimuth)
             size = 0.5 * (np.abs(there) + np.abs(back))
             good = np.isfinite(there) & np.isfinite(back) & (size > 0)
             differences.append(np.abs(there - back)[good] / size[good])
@@ -77,6 +73,49 @@ def data_reciprocity(m: Measurement) -> tuple[float, int] | None:
     return float(np.median(joined)), int(joined.size)
 
 
-def _plane(theta: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # Both halves folded onto one: isotropic data are compared as if symmetric.
-    return theta * np.cos(delta), theta * np.abs(np.sin(delta))
+@dataclass(frozen=True)
+class _Rings:
+    """A table of one incidence: polar angles, and per ring azimuths and values."""
+
+    theta: np.ndarray
+    rings: list[tuple[np.ndarray, np.ndarray]]
+
+    @staticmethod
+    def of(theta: np.ndarray, delta: np.ndarray, value: np.ndarray) -> _Rings:
+        ring = incidence_labels(theta)
+        levels, rings = [], []
+        for k in range(ring.max() + 1):
+            rows = np.flatnonzero(ring == k)
+            rows = rows[np.argsort(delta[rows], kind="stable")]
+            levels.append(theta[rows].mean())
+            rings.append((delta[rows], value[rows]))
+        return _Rings(np.asarray(levels), rings)
+
+    def at(self, theta: float, azimuth: np.ndarray) -> np.ndarray:
+        """Linear in azimuth on the two neighbouring rings and between them; else NaN."""
+        above = int(np.searchsorted(self.theta, theta - _SAME_DIRECTION))
+        if above == self.theta.size:
+            return np.full(azimuth.size, np.nan)
+        upper = self._on_ring(above, azimuth)
+        if abs(self.theta[above] - theta) < _SAME_DIRECTION:
+            return upper
+        if above == 0 or self.theta[above] - self.theta[above - 1] > _WIDEST_GAP:
+            return np.full(azimuth.size, np.nan)
+        low, high = self.theta[above - 1], self.theta[above]
+        share = (theta - low) / (high - low)
+        return (1 - share) * self._on_ring(above - 1, azimuth) + share * upper
+
+    def _on_ring(self, k: int, azimuth: np.ndarray) -> np.ndarray:
+        delta, value = self.rings[k]
+        if self.theta[k] < _SAME_DIRECTION:
+            return np.full(azimuth.size, value.mean())
+        nearest = np.abs(azimuth[:, None] - delta).min(axis=1)
+        inside = (azimuth > delta[0] - _SAME_DIRECTION) & (
+            azimuth < delta[-1] + _SAME_DIRECTION
+        )
+        good = inside & (nearest < 0.5 * _WIDEST_GAP)
+        return np.where(good, np.interp(azimuth, delta, value), np.nan)
+
+
+def _sin_cos(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return np.sin(angle), np.cos(angle)
