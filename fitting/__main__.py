@@ -1,6 +1,8 @@
 """``python -m fitting`` is the command ``brdf``."""
 
+import sys
+
 from fitting.cli import main
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -71,11 +71,10 @@ def choose(results: tuple[FitResult, ...]) -> tuple[int, str]:
         return 0, f"{results[0].model} is the only model asked for"
     held = [_held_out(r) for r in results]
     if any(h is None for h in held):
-        cost = [r.solver.cost for r in results]
-        best = int(np.argmin(cost))
+        best = int(np.argmin([r.solver.cost for r in results]))
         return best, (
-            f"{results[best].model} fits best; a single angle of incidence leaves nothing "
-            "to hold out, so more parameters always look better"
+            f"{results[best].model} is nearest to the data; without held-out angles of "
+            "incidence, more parameters always look better"
         )
     errors = np.asarray([h for h in held if h is not None])
     total = [r.cross_validation.objective for r in results if r.cross_validation]

@@ -25,7 +25,7 @@ def data_albedo(m: Measurement) -> list[tuple[float, float, float]]:
     out: list[tuple[float, float, float]] = []
     for k in np.unique(label[up]):
         rows = np.flatnonzero(up & (label == k))
-        angle = solid_angles(m.theta_r[rows], m.phi_r[rows])
+        angle = solid_angles(m.theta_r[rows], m.phi_r[rows] - m.phi_i[rows])
         if angle is None:
             continue
         projected = angle * np.cos(m.theta_r[rows])

@@ -115,7 +115,10 @@ def _fit(
     return FitResult(
         schema_version=SCHEMA_VERSION,
         model=model.expression,
-        channels=[Channel(c.name, c.wavelength_nm) for c in measurement.channels],
+        channels=[
+            Channel(c.name, None if c.wavelength_nm is None else float(c.wavelength_nm))
+            for c in measurement.channels
+        ],
         parameters=parameters,
         uncertainty_method="row-clustered sandwich, HC3",
         correlations=correlations,
@@ -285,15 +288,16 @@ def _solver(found: list[Found], objective: str) -> Solver:
         if b > 0 and any(b * (1 + _SAME_COST) < c < math.inf for c in f.costs)
     ]
     steps = max(int(f.solution.steps) for f in found)
+    after = f"{steps} step{'' if steps == 1 else 's'}"
     if not converged:
-        sentence = f"stopped after {steps} steps without convergence"
+        sentence = f"stopped after {after} without convergence"
     elif n_starts == 1:
-        sentence = f"converged in {steps} steps from a single start"
+        sentence = f"converged in {after} from a single start"
     elif agreeing == n_starts:
-        sentence = f"converged in {steps} steps; all {n_starts} starts agree"
+        sentence = f"converged in {after}; all {n_starts} starts agree"
     else:
         sentence = (
-            f"converged in {steps} steps; {agreeing} of {n_starts} starts reach the best "
+            f"converged in {after}; {agreeing} of {n_starts} starts reach the best "
             f"minimum, the next one costs {min(others, default=math.nan):.4g} times as much"
         )
     return Solver(
@@ -319,6 +323,8 @@ def _settings(objective: str, options: FitOptions) -> Settings:
         noise=options.noise,
         per_channel_shape=options.per_channel_shape,
         starts=options.starts,
+        energy=options.energy if options.energy == "hard" else float(options.energy),
+        reciprocity=options.reciprocity,
         fix={k: [float(x) for x in np.atleast_1d(v)] for k, v in options.fix.items()},
         bounds={k: (end(a), end(b)) for k, (a, b) in options.bounds.items()},
         tie=dict(options.tie),

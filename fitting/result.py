@@ -7,7 +7,7 @@ import math
 import os
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -177,6 +177,8 @@ class Settings(msgspec.Struct, frozen=True):
     noise: tuple[float, float] | None
     per_channel_shape: bool
     starts: int
+    energy: float | Literal["hard"]
+    reciprocity: float
     fix: dict[str, list[float]]
     bounds: dict[str, tuple[float | None, float | None]]
     tie: dict[str, str]

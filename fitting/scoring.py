@@ -58,7 +58,7 @@ def score(measurement: Measurement, result: FitResult) -> Score:
 
 
 def options_of(settings: Settings) -> FitOptions:
-    """The options that a result was fitted with, as far as they concern residuals."""
+    """The options that a result was fitted with: the same fit can be made again."""
 
     def end(v: float | None, infinite: float) -> float:
         return infinite if v is None else v
@@ -68,6 +68,8 @@ def options_of(settings: Settings) -> FitOptions:
         weights=settings.weights,  # pyright: ignore[reportArgumentType]
         max_theta_deg=settings.max_theta_deg,
         robust=settings.robust,
+        energy=settings.energy,
+        reciprocity=settings.reciprocity,
         noise=settings.noise,
         fix={k: v[0] if len(v) == 1 else np.asarray(v) for k, v in settings.fix.items()},
         bounds={

@@ -22,22 +22,22 @@ def solid_angle_weights(
     weights = np.empty(theta_i.size)
     for label in range(incidence.max(initial=-1) + 1):
         rows = np.flatnonzero(incidence == label)
-        own = _of_one_incidence(theta_r[rows], phi_r[rows])
+        own = _of_one_incidence(theta_r[rows], phi_r[rows] - phi_i[rows])
         weights[rows] = own / own.mean()
     return weights
 
 
-def solid_angles(theta_r: np.ndarray, phi_r: np.ndarray) -> np.ndarray | None:
-    """Solid angle in sr of each row of one incidence, which together cover the rings.
+def solid_angles(theta_r: np.ndarray, delta: np.ndarray) -> np.ndarray | None:
+    """Solid angle in sr of each row of one incidence; ``delta = phi_r - phi_i``.
 
-    None where the directions are not on rings, so that no absolute figure is known. Data
-    of one half of the hemisphere stand for both.
+    None where the directions are not on rings, so that no absolute figure is known. Rows
+    that lie on one side of the plane of incidence stand for both.
     """
     ring = _labels(theta_r[None])
     count = int(ring.max()) + 1
     if count < 4 or theta_r.size < 3 * count:
         return None
-    return 2.0 * np.pi * _of_rings(theta_r, phi_r, ring)
+    return _of_rings(theta_r, delta, ring)
 
 
 def incidence_labels(theta_i: np.ndarray) -> np.ndarray:
@@ -50,18 +50,20 @@ def _labels(columns: np.ndarray) -> np.ndarray:
     return np.unique(rounded, axis=1, return_inverse=True)[1].reshape(-1)
 
 
-def _of_one_incidence(theta: np.ndarray, phi: np.ndarray) -> np.ndarray:
+def _of_one_incidence(theta: np.ndarray, delta: np.ndarray) -> np.ndarray:
     if theta.size == 1:
         return np.ones(1)
     ring = _labels(theta[None])
     count = ring.max() + 1
     if count > 3 and theta.size < 3 * count:
-        return _of_scattered(theta, phi)
-    return _of_rings(theta, phi, ring)
+        return _of_scattered(theta, delta)
+    return _of_rings(theta, delta, ring)
 
 
-def _of_rings(theta: np.ndarray, phi: np.ndarray, ring: np.ndarray) -> np.ndarray:
-    """Zone of each ring times the share of its rows in the circle."""
+def _of_rings(theta: np.ndarray, delta: np.ndarray, ring: np.ndarray) -> np.ndarray:
+    """Zone of each ring times the azimuth that each of its rows stands for."""
+    side = np.sin(delta)
+    one_sided = bool(np.all(side > -_SAME_ANGLE) or np.all(side < _SAME_ANGLE))
     count = int(ring.max()) + 1
     level = np.bincount(ring, theta) / np.bincount(ring)
     middle = 0.5 * (level[1:] + level[:-1])
@@ -75,27 +77,47 @@ def _of_rings(theta: np.ndarray, phi: np.ndarray, ring: np.ndarray) -> np.ndarra
     out = np.empty(theta.size)
     for k in range(count):
         rows = np.flatnonzero(ring == k)
-        out[rows] = zone[k] * _azimuth_shares(phi[rows])
+        out[rows] = zone[k] * _azimuth_widths(delta[rows], one_sided)
     return out
 
 
-def _azimuth_shares(phi: np.ndarray) -> np.ndarray:
-    order = np.argsort(np.mod(phi, 2 * np.pi), kind="stable")
-    sorted_phi = np.mod(phi, 2 * np.pi)[order]
-    gaps = np.diff(np.concatenate([sorted_phi, sorted_phi[:1] + 2 * np.pi]))
-    # The widest gap is unmeasured, for instance the other half of a symmetric sample.
-    gaps = np.minimum(gaps, 2.0 * np.median(gaps) + 1e-12)
-    share = 0.5 * (gaps + np.roll(gaps, 1)) + 1e-12
-    out = np.empty(phi.size)
-    out[order] = share / share.sum()
-    return out
+def _azimuth_widths(delta: np.ndarray, one_sided: bool) -> np.ndarray:
+    """Width in azimuth between the mid-points to the neighbours on a ring, rad.
+
+    A gap wider than twice the usual one is not bridged: what was not measured stands for
+    nothing. Repeated directions share their width.
+    """
+    angle = np.mod(delta, 2 * np.pi)
+    if one_sided:
+        angle = np.abs(np.arctan2(np.sin(delta), np.cos(delta)))
+    distinct, which, count = np.unique(
+        np.round(angle / _SAME_ANGLE).astype(np.int64),
+        return_inverse=True,
+        return_counts=True,
+    )
+    angle = distinct * _SAME_ANGLE
+    if angle.size == 1:
+        return np.full(delta.size, 2 * np.pi / delta.size)
+    inner = np.diff(angle)
+    reach = np.median(inner)
+    if one_sided:
+        # The mirror images of the first and the last row are their neighbours.
+        before, after = 2 * angle[:1], 2 * (np.pi - angle[-1:])
+        gaps = np.minimum(np.concatenate([before, inner, after]), 2.0 * reach)
+        width = gaps[:-1] + gaps[1:]
+    else:
+        around = np.concatenate([inner, angle[:1] + 2 * np.pi - angle[-1:]])
+        gaps = np.minimum(around, 2.0 * reach)
+        width = 0.5 * (gaps + np.roll(gaps, 1))
+    return (width / count)[which.reshape(-1)] + 1e-12
 
 
-def _of_scattered(theta: np.ndarray, phi: np.ndarray) -> np.ndarray:
+def _of_scattered(theta: np.ndarray, delta: np.ndarray) -> np.ndarray:
     from scipy.spatial import KDTree
 
     points = np.stack(
-        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1
+        [np.sin(theta) * np.cos(delta), np.sin(theta) * np.sin(delta), np.cos(theta)],
+        axis=1,
     )
     neighbours = min(5, theta.size)
     distance, _ = KDTree(points).query(points, k=neighbours)

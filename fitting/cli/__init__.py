@@ -27,11 +27,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
-        print("brdf: interrupted; nothing was written", file=sys.stderr)
+        print("brdf: interrupted", file=sys.stderr)
+        if argv is None:
+            _leave_at_once(failures.INTERRUPTED)
         return failures.INTERRUPTED
-    except BrokenPipeError:
-        # The reader of a pipe, such as `head`, has seen enough.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (BrokenPipeError, SystemExit):
+        # The reader of a pipe, such as `head`, has seen enough; rich turns the former into
+        # the latter.
+        if argv is None:
+            _leave_at_once(failures.GOOD)
         return failures.GOOD
     except Exception as error:  # The outermost edge: people get a sentence.
         return failures.report(error, debug)
@@ -44,6 +48,16 @@ def _run(tokens: list[str]) -> int:
         tokens, exit_on_error=False, print_error=False, result_action="return_value"
     )
     return code if isinstance(code, int) else 0
+
+
+def _leave_at_once(code: int) -> None:
+    """End the process without tearing down the interpreter.
+
+    Threads of XLA's compiler may still run, and crash if Python goes away below them; the
+    buffer of a closed pipe cannot be flushed.
+    """
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def _prepare_process(debug: bool) -> None:

@@ -16,12 +16,31 @@ _COMMANDS = {
     "doctor": "Check that the installation works.",
 }
 
-_EPILOGUE = """\
-Begin with `brdf fit`, which fits the bundled sample, or `brdf fit FILE`. Every command
-explains itself: `brdf fit --help`.
+_CODES = "Exit codes: 0 good, 1 the fit did not converge, 2 usage, 3 unreadable input.\n"
 
-Exit codes: 0 good, 1 the fit did not converge, 2 usage, 3 unreadable input.
-"""
+_EPILOGUE = f"""\
+Begin with `brdf fit`, which fits the bundled sample, or `brdf fit FILE`.
+Every command explains itself: `brdf fit --help`.
+
+{_CODES}"""
+
+
+_EXAMPLES = {
+    "fit": """\
+Examples:
+  brdf fit                                  the bundled sample
+  brdf fit paint.astm                       some common models compared
+  brdf fit paint.astm -m 'lambert + ggx'    one model
+  brdf fit paint.astm -m 'eon + ggx' --fix ggx.f90=1 --max-theta 75
+  brdf fit paint.astm --json > paint.json   for programs
+""",
+    "info": "Example: brdf info paint.astm\n",
+    "score": "Example: brdf score other_sample.astm paint.fit.json\n",
+    "convert": "Example: brdf convert paint.astm paint.csv\n",
+    "models": "Examples: brdf models; brdf models ggx\n",
+    "formats": "Examples: brdf formats; brdf formats csv\n",
+    "doctor": "",
+}
 
 
 def application() -> App:
@@ -31,8 +50,15 @@ def application() -> App:
         help="Fit parametric reflectance models to goniometer files, with honest errors.",
         help_epilogue=_EPILOGUE,
         version=lambda: f"brdf {version('brdf-fitting')}",
+        help_format="plaintext",
         suppress_keyboard_interrupt=False,
     )
     for order, (name, text) in enumerate(_COMMANDS.items()):
-        app.command(f"fitting.cli.{name}:{name}", name=name, help=text, sort_key=order)
+        app.command(
+            f"fitting.cli.{name}:{name}",
+            name=name,
+            help=text,
+            help_epilogue=_EXAMPLES[name] + _CODES,
+            sort_key=order,
+        )
     return app

@@ -29,13 +29,8 @@ def fit(
 ) -> int:
     """Fit models to a file of measured reflectance and judge the result.
 
-    Prints the parameters with standard uncertainties, the errors, what the data leave
-    open, and a verdict; writes everything to NAME.fit.json.
-
-        brdf fit paint.astm                            four common models compared
-        brdf fit paint.astm -m 'lambert + ggx'         one model
-        brdf fit paint.astm -m 'eon + ggx' --fix ggx.f90=1 --max-theta 75
-        brdf fit paint.astm --json > paint.json        for programs
+    Prints parameters with standard uncertainties, errors, what the data leave open, and a
+    verdict; writes everything to NAME.fit.json.
     """
     flags = flags or Flags()
     from fitting.cli.fit_settings import settle
@@ -55,16 +50,17 @@ def fit(
             say.print("no FILE given: fitting the bundled sample, which is synthetic")
         say.print(reading.headline(measurement, path), style="dim")
 
+    from fitting.cli import jax_setup
+
+    jax_setup.set_up()
     from fitting.cli import fit_run
 
     done = fit_run.run(measurement, job, flags)
     result = done.results[done.best]
-    if job.json:
-        text = result.to_json()
     if target is not None:
         result.save(target)
     if job.json:
-        sys.stdout.write(text + "\n")
+        sys.stdout.write(result.to_json() + "\n")
     else:
         from fitting.cli import fit_report
 

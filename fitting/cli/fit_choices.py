@@ -11,7 +11,7 @@ from cyclopts import Group, Parameter
 _MODEL = Group("Model", sort_key=1)
 _OBJECTIVE = Group("What is made small", sort_key=2)
 _PHYSICS = Group("Physics", sort_key=3)
-_PARAMETERS = Group("Parameters", sort_key=4)
+_PARAMETERS = Group("Single parameters", sort_key=4)
 _SEARCH = Group("Search and judgement", sort_key=5)
 _FILES = Group("Files", sort_key=6)
 
@@ -32,7 +32,7 @@ class Choices:
         Parameter(
             name=("--model", "-m"), negative="", group=_MODEL,
             help="A sum of lobes, such as 'lambert + ggx' or 'eon + 2*ggx(aniso)'; see "
-            "`brdf models`. Repeat to compare. Without: four common models.",
+            "`brdf models`. Repeat to compare. Without: some common models are compared.",
         ),
     ] = None  # fmt: skip
     per_channel_shape: Annotated[
@@ -51,7 +51,8 @@ class Choices:
         WeightsChoice | None,
         Parameter(
             group=_OBJECTIVE,
-            help="solid-angle: a row counts for its part of the hemisphere; rows: all alike.",
+            help="solid-angle: a row counts for its part of the hemisphere; rows: all "
+            "alike.",
         ),
     ] = None
     max_theta: Annotated[
@@ -82,9 +83,7 @@ class Choices:
     ] = None
     reciprocity: Annotated[
         float | None,
-        Parameter(
-            group=_PHYSICS, help="Weight of the penalty on f(wi,wo) - f(wo,wi) (1)."
-        ),
+        Parameter(group=_PHYSICS, help="Weight of the penalty on f(wi,wo) - f(wo,wi) (1)."),
     ] = None
     fix: Annotated[
         list[str] | None,

@@ -7,19 +7,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from data_formats import Measurement
-from fitting.cli import jax_setup, terminal
+from fitting.cli import terminal
 from fitting.cli.failures import UsageError
 from fitting.cli.fit_settings import Job
 from fitting.cli.flags import Flags
 from fitting.cli.steps import Steps
-
-# JAX is settled before anything that uses it is imported.
-jax_setup.set_up()
-
-from fitting.comparison import DEFAULT_MODELS, Comparison, choose  # noqa: E402
-from fitting.fitter import fit  # noqa: E402
-from fitting.model import Model  # noqa: E402
-from fitting.options import FitOptions  # noqa: E402
+from fitting.comparison import DEFAULT_MODELS, Comparison, choose
+from fitting.fitter import fit
+from fitting.model import Model
+from fitting.options import FitOptions
 
 _BY_NAME = ("fix", "bounds", "tie")
 

@@ -18,21 +18,24 @@ class Flags:
     quiet: Annotated[
         bool,
         Parameter(
-            name=("--quiet", "-q"), negative="", group=_GROUP,
+            name=("--quiet", "-q"), negative="", show_default=False, group=_GROUP,
             help="Only the essential line, no progress and no warnings.",
         ),
     ] = False  # fmt: skip
     verbose: Annotated[
         bool,
         Parameter(
-            name=("--verbose", "-v"), negative="", group=_GROUP,
+            name=("--verbose", "-v"), negative="", show_default=False, group=_GROUP,
             help="Everything: all channels, settings, what is being done and when.",
         ),
     ] = False  # fmt: skip
     debug: Annotated[
         bool,
         Parameter(
-            negative="", group=_GROUP, help="The traceback, should something go wrong."
+            negative="",
+            show_default=False,
+            group=_GROUP,
+            help="The traceback, should something go wrong.",
         ),
     ] = False
 
@@ -45,6 +48,9 @@ class DebugFlag:
     debug: Annotated[
         bool,
         Parameter(
-            negative="", group=_GROUP, help="The traceback, should something go wrong."
+            negative="",
+            show_default=False,
+            group=_GROUP,
+            help="The traceback, should something go wrong.",
         ),
     ] = False

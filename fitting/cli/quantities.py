@@ -38,6 +38,13 @@ def percent(share: float) -> str:
     return f"{value:.0f} %" if abs(value) >= 10 else f"{value:.2g} %"
 
 
+def valid_share(share: float) -> str:
+    """A share of valid values, which is 100 % only if not one is missing."""
+    if 0.99 < share < 1.0:
+        return "99 %" if share < 0.995 else f"{min(100.0 * share, 99.99):.2f} %"
+    return percent(share)
+
+
 def degrees(value: float) -> str:
     """An angle in degrees with at most one decimal, and no ``-0``."""
     return f"{round(value, 1) + 0.0:g}"

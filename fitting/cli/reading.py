@@ -38,9 +38,19 @@ def read_file(
 
 
 def reader_options(module: Any) -> list[str]:
-    """Options of a format's reader, with type and default."""
-    parameters = inspect.signature(module.read).parameters.values()
-    return [str(p) for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY]
+    """Options of a format's reader: name, default, and what its documentation says."""
+    lines = inspect.cleandoc(module.read.__doc__ or "").split("\n- ")
+    said = {k: " ".join(v.partition("\n\n")[0].split()) for k, v in map(_term, lines)}
+    return [
+        f"{p.name}={p.default}: {said.get(p.name, '')}".rstrip(": ")
+        for p in inspect.signature(module.read).parameters.values()
+        if p.kind is inspect.Parameter.KEYWORD_ONLY
+    ]
+
+
+def _term(line: str) -> tuple[str, str]:
+    name, _, text = line.partition(": ")
+    return name.strip("`"), text.replace("`", "")
 
 
 def stem(path: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import textwrap
 from typing import TextIO
 
 from rich import box
@@ -54,8 +55,13 @@ def heading(text: str) -> Text:
     return Text(f"\n{text}", style="bold")
 
 
-def bullet(text: str, style: str = "") -> Table:
-    """A sentence with a mark, whose further lines are indented."""
-    grid = Table.grid(padding=(0, 1))
-    grid.add_row(Text("-", style=style), Text(text, style=style))
-    return grid
+def bullet(out: Console, text: str, style: str = "") -> None:
+    """Print a sentence with a mark, whose further lines are indented."""
+    lines = textwrap.fill(
+        text,
+        max(out.width, 20),
+        initial_indent="- ",
+        subsequent_indent="  ",
+        break_on_hyphens=False,
+    )
+    out.print(lines, style=style, soft_wrap=True)

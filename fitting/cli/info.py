@@ -1,0 +1,180 @@
+"""``brdf info``: what is in a file, before anything is fitted."""
+
+from __future__ import annotations
+
+import json as json_module
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from fitting.cli.flags import Flags
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def info(
+    file: Annotated[Path, Parameter(help="A file of measured reflectance.")],
+    /,
+    *,
+    json: Annotated[
+        bool,
+        Parameter(
+            negative="", show_default=False, help="Everything as JSON, for programs."
+        ),
+    ] = False,
+    format: Annotated[
+        str | None, Parameter(help="Format of the file, if it is not recognised.")
+    ] = None,
+    reader: Annotated[
+        list[str] | None,
+        Parameter(negative="", help="OPTION=VALUE for the format's reader. Repeatable."),
+    ] = None,
+    flags: Flags | None = None,
+) -> int:
+    """Say what is in a file: geometry, coverage, values, quality."""
+    from fitting.cli import assignments, reading
+
+    options = assignments.of_lines("reader", reader or [])
+    measurement = reading.read_file(file, format, options)
+
+    from fitting.cli.data_summary import summarise
+
+    summary = summarise(measurement)
+    if json:
+        sys.stdout.write(json_module.dumps(summary, indent=1, allow_nan=False) + "\n")
+        return 0
+    from fitting.cli.terminal import stdout
+
+    out = stdout()
+    out.print(reading.headline(measurement, file), style="bold")
+    if not (flags or Flags()).quiet:
+        _show(out, summary, (flags or Flags()).verbose)
+    return 0
+
+
+def _show(out: Console, s: dict[str, Any], everything: bool) -> None:
+    _origin(out, s, everything)
+    _geometry(out, s)
+    _values(out, s, everything)
+    _quality(out, s)
+
+
+def _origin(out: Console, s: dict[str, Any], everything: bool) -> None:
+    from fitting.cli.terminal import bullet
+
+    for name in ("format", "instrument", "sample", "date"):
+        if s[name]:
+            bullet(out, f"{name}: {s[name]}")
+    if s["auxiliary"]:
+        bullet(out, f"further columns: {', '.join(s['auxiliary'])}")
+    bullet(out, "standard uncertainties: " + ("yes" if s["has_uncertainty"] else "none"))
+    if everything:
+        bullet(out, f"sha256: {s['sha256']}")
+        for key, text in s["header"].items():
+            bullet(out, f"header {key}: {text}")
+
+
+def _geometry(out: Console, s: dict[str, Any]) -> None:
+    from fitting.cli.quantities import count, degrees, percent, valid_share
+    from fitting.cli.terminal import heading, table
+
+    out.print(heading("Geometry, by angle of incidence"))
+    rows = table(
+        "theta_i", "rows", "valid", "theta_r", "steps up to", "azimuth", "mirror", "retro",
+        "albedo", "covered",
+    )  # fmt: skip
+    for line in _few(s["incidence"]):
+        if line is None:
+            rows.add_row("...")
+            continue
+        covered = line["covered"]
+        rows.add_row(
+            degrees(line["theta_i_deg"]),
+            str(line["rows"]),
+            valid_share(line["valid"]),
+            _range(line["theta_r_deg"]),
+            _rounded(line["largest_step_deg"], 1),
+            _range(line["azimuth_deg"]),
+            _rounded(line["nearest_to_mirror_deg"], 1),
+            _rounded(line["nearest_to_retro_deg"], 1),
+            _rounded(line["albedo"], 3),
+            "-" if covered is None else percent(covered),
+        )
+    out.print(rows)
+    out.print(
+        "angles in deg; azimuth of the detector from the source's (180: mirror side); "
+        "mirror, retro: distance of these directions to the nearest valid row; albedo of "
+        "the largest channel by summation over the covered share of the hemisphere",
+        style="dim",
+    )
+    inside, total = s["rows_in_plane"], s["rows"]
+    where = "all" if inside == total else f"{inside} of {count(total, 'row')}"
+    out.print(f"in the plane of incidence: {where}; symmetry: {s['symmetry']}")
+    if s["rows_transmitted"]:
+        out.print(f"transmitted (theta_r > 90 deg): {count(s['rows_transmitted'], 'row')}")
+
+
+def _values(out: Console, s: dict[str, Any], everything: bool) -> None:
+    from fitting.cli.quantities import number, shown_channels, valid_share
+    from fitting.cli.terminal import heading, table
+
+    out.print(heading("Values, 1/sr, without cosine"))
+    rows = table("channel", "valid", "minimum", "median", "maximum")
+    shown = shown_channels(len(s["channels"]), everything)
+    for c in shown:
+        line = s["channels"][c]
+        rows.add_row(
+            line["name"],
+            valid_share(line["valid"]),
+            *(number(line[k]) for k in ("minimum", "median", "maximum")),
+        )
+    out.print(rows)
+    v = s["values"]
+    said = f"all channels: {valid_share(v['valid'])} valid, {number(v['minimum'])} to "
+    said += f"{number(v['maximum'])}, {v['negative']} negative, {v['zero']} exactly zero"
+    if len(shown) < len(s["channels"]):
+        said += f"; {len(shown)} of {len(s['channels'])} channels shown, all with -v"
+    out.print(said, style="dim")
+
+
+def _quality(out: Console, s: dict[str, Any]) -> None:
+    from fitting.cli.quantities import count, percent
+    from fitting.cli.terminal import bullet, heading
+
+    out.print(heading("Quality"))
+    r = s["reciprocity"]
+    if r is None:
+        bullet(out, "reciprocity cannot be tested: no exchanged directions were measured")
+    else:
+        bullet(
+            out,
+            "exchanging source and detector changes the data by "
+            f"{percent(r['median_relative_difference'])} (median of "
+            f"{count(r['pairs'], 'pair')}, interpolated)",
+        )
+    bright = [i for i in s["incidence"] if (i["albedo"] or 0.0) > 1.0]
+    for line in bright[:3]:
+        bullet(
+            out,
+            f"at theta_i = {line['theta_i_deg']:.1f} deg the data sum to "
+            f"{percent(line['albedo'])} of the light: more than falls in",
+        )
+    for note in s["notes"]:
+        bullet(out, note["sentence"])
+
+
+def _few(lines: list[dict[str, Any]]) -> list[dict[str, Any] | None]:
+    """All lines, or the first and last of very many with a gap between."""
+    return list(lines) if len(lines) <= 24 else [*lines[:16], None, *lines[-4:]]
+
+
+def _rounded(value: float | None, decimals: int) -> str:
+    return "-" if value is None else f"{round(value, decimals) + 0.0:g}"
+
+
+def _range(ends: list[float]) -> str:
+    low, high = round(ends[0], 1) + 0.0, round(ends[1], 1) + 0.0
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
