@@ -88,7 +88,7 @@ def _fit(
     names = [c.name for c in measurement.channels]
     objective = problem.resolve_objective(options.objective, rows.sigma is not None)
     say("searching for the shape")
-    found = [_search(p, options) for p in _problems(rows, model, options)]
+    found = _search_all(rows, model, options)
     width = math.inf
     if options.robust:
         say("again with robust residuals")
@@ -158,30 +158,46 @@ def _problems(
         yield problem.for_channel(whole, c)
 
 
-def _search(p: Problem, options: FitOptions) -> Found:
+def _search_all(rows: Rows, model: Model, options: FitOptions) -> list[Found]:
+    """The best minimum of every problem, each from its own starts.
+
+    Channels with a shape of their own also start from the shape that they share best, so
+    that they never end up worse than with it.
+    """
+    if not options.per_channel_shape:
+        return [_search(p, options) for p in _problems(rows, model, options)]
+    together = dataclasses.replace(options, per_channel_shape=False)
+    (shared,) = _search_all(rows, model, together)
+    u, x = shared.solution.u, shared.solution.x
+    return [
+        _search(p, options, (u, x[c : c + 1]))
+        for c, p in enumerate(_problems(rows, model, options))
+    ]
+
+
+def _search(
+    p: Problem, options: FitOptions, also: tuple[np.ndarray, np.ndarray] | None = None
+) -> Found:
     count = max(1, options.starts) if p.unknowns.n_shape else 1
     points, x = starts.best_starts(p, count)
-    ends = [
-        jax.device_get(refine(p, jnp.asarray(u), jnp.asarray(c)))
-        for u, c in zip(points, x, strict=True)
-    ]
+    begin = [*zip(points, x, strict=True), *([also] if also else [])]
+    ends = [jax.device_get(refine(p, jnp.asarray(u), jnp.asarray(c))) for u, c in begin]
     return _best(p, ends)
 
 
 def _best(p: Problem, ends: list[Solution]) -> Found:
     cost = [float(e.cost) if math.isfinite(e.cost) else math.inf for e in ends]
-    return Found(p, ends[int(np.argmin(cost))], tuple(cost))
+    return Found(p, ends[int(np.argmin(cost))], tuple(ends))
 
 
 def _again(
     rows: Rows, model: Model, options: FitOptions, found: list[Found], **kwargs: Any
 ) -> list[Found]:
-    """Refit from the minima found, with other residuals."""
+    """Refit with other residuals, from every end: the order of the minima may change."""
     out: list[Found] = []
     for p, before in zip(_problems(rows, model, options, **kwargs), found, strict=True):
-        u, x = jnp.asarray(before.solution.u), jnp.asarray(before.solution.x)
-        end = _best(p, [jax.device_get(refine(p, u, x))])
-        out.append(dataclasses.replace(end, costs=before.costs))
+        begin = [(jnp.asarray(e.u), jnp.asarray(e.x)) for e in before.ends]
+        out.append(_best(p, [jax.device_get(refine(p, u, x)) for u, x in begin]))
     return out
 
 

@@ -46,4 +46,4 @@ class FitOptions:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     tie: Mapping[str, str] = field(default_factory=dict)
     per_channel_shape: bool = False
-    starts: int = 4
+    starts: int = 8

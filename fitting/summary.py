@@ -21,11 +21,17 @@ _AT_BOUND_SHARE = 5e-4
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """The best minimum of one problem (all channels, or one of them), and all costs."""
+    """The best minimum of one problem (all channels, or one of them), and all ends."""
 
     problem: Problem
     solution: Solution
-    costs: tuple[float, ...]
+    ends: tuple[Solution, ...]
+
+    @property
+    def costs(self) -> tuple[float, ...]:
+        """Where every start ended, infinite for one that failed."""
+        cost = (float(e.cost) for e in self.ends)
+        return tuple(c if np.isfinite(c) else np.inf for c in cost)
 
     def values(self) -> dict[str, np.ndarray]:
         """All parameters by name; coefficients ``(c,)``. In numpy: nothing to compile."""

@@ -112,9 +112,14 @@ def _on_free_directions(
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Inverse after scaling to a unit diagonal; a tiny ridge keeps it finite."""
+    """Inverse after scaling to a unit diagonal; a tiny ridge keeps it finite.
+
+    What the data say nothing about gets a huge, finite variance.
+    """
     if not matrix.size:
         return matrix
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    diagonal = np.diag(matrix)
+    floor = max(1e-30 * float(diagonal.max()), 1e-100)
+    scale = 1.0 / np.sqrt(np.maximum(diagonal, floor))
     unit = matrix * np.outer(scale, scale) + 1e-14 * np.eye(scale.size)
     return np.linalg.inv(unit) * np.outer(scale, scale)

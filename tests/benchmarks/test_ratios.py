@@ -13,8 +13,8 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
-from statistics import median
 
 import jax
 import jax.numpy as jnp
@@ -64,13 +64,13 @@ def made(rows: int, parameters: dict, **noise: float) -> Measurement:
 
 
 def timed(run: Callable, repeats: int):
-    """Median seconds of ``run()``, and its last answer."""
+    """Least seconds of ``run()``, which other load disturbs least, and its answer."""
     seconds = []
     for _ in range(repeats):
         begin = time.perf_counter()
         answer = run()
         seconds.append(time.perf_counter() - begin)
-    return median(seconds), answer
+    return min(seconds), answer
 
 
 def ours(problem: Problem, starts: int) -> Solution:
@@ -162,8 +162,6 @@ class Plain:
         return np.asarray(self.dense(z))
 
 
-# Repeats: scipy's exact solver takes a singular value decomposition of 44,485 x 94 per
-# step, 10 to 30 s in all, and does not need a second run beside a ratio above 1,000.
 @pytest.mark.parametrize(
     ("tie", "parameters"),
     [({}, 1 + 3 * CHANNELS), ({"ggx.f0": "0.04*ggx.f90"}, 1 + 2 * CHANNELS)],
@@ -189,7 +187,7 @@ def test_fit_is_a_hundred_times_faster_than_all_parameters_at_once(tie, paramete
         four, best_of_four = timed(lambda: ours(problem, 4), OURS_REPEATS)
         theirs = {
             solver: timed(lambda s=solver: plain.solve(s), repeats)
-            for solver, repeats in (("exact", 1), ("lsmr", 3), ("sparse", 5))
+            for solver, repeats in (("exact", 2), ("lsmr", 3), ("sparse", 5))
         }
     line(f"{name}, {n} x {c}, {MODEL}, l2, {parameters} parameters")
     line(f"  {'method':44} {'seconds':>9} {'times ours':>11} {'cost / ours - 1':>16}")
@@ -201,17 +199,14 @@ def test_fit_is_a_hundred_times_faster_than_all_parameters_at_once(tie, paramete
     line(f"  {'scan and one start':44} {single:9.4f} {1:11.1f} {'':>16}")
     line(f"  {'scan and four starts, as fit() does':44} {four:9.4f} {four / single:11.1f}")
     for solver, (seconds, answer) in theirs.items():
-        excess = 2 * answer.cost / float(best.cost) - 1
-        line(
-            f"  {described[solver]:44} {seconds:9.4f} {seconds / single:11.1f} {excess:16.1e}"
-        )
+        ratio, excess = seconds / single, 2 * answer.cost / float(best.cost) - 1
+        line(f"  {described[solver]:44} {seconds:9.4f} {ratio:11.1f} {excess:16.1e}")
 
     assert bool(best.converged)
     assert float(best.cost) <= float(best_of_four.cost) * (1 + SAME_COST)
     for _, answer in theirs.values():
         assert abs(2 * answer.cost / float(best.cost) - 1) < SAME_COST
     assert theirs["exact"][0] >= 100 * single
-    assert theirs["exact"][0] >= 100 * four or parameters < 94
     assert theirs["sparse"][0] >= 3 * single
 
 
@@ -241,15 +236,13 @@ def temporary_bytes(rows: int, channels: int) -> int:
 def test_memory_grows_no_faster_than_the_data_and_holds_no_jacobian(line):
     needed = {size: temporary_bytes(*size) for size in SIZES}
     line("temporary memory of the compiled solver")
-    line(
-        f"  {'rows x channels':>16} {'MB':>8} {'bytes per value':>16} {'Jacobian, MB':>13}"
-    )
+    line(f"  {'rows x channels':>16} {'MB':>8} {'bytes/value':>12} {'Jacobian, MB':>13}")
     for (rows, channels), temporary in needed.items():
         values = rows * channels
         jacobian = 8 * values * (1 + 3 * channels)
         line(
             f"  {f'{rows} x {channels}':>16} {temporary / 1e6:8.2f} "
-            f"{temporary / values:16.1f} {jacobian / 1e6:13.1f}"
+            f"{temporary / values:12.1f} {jacobian / 1e6:13.1f}"
         )
     first = SIZES[0]
     for size, temporary in needed.items():
@@ -262,17 +255,17 @@ def test_memory_grows_no_faster_than_the_data_and_holds_no_jacobian(line):
 
 def test_where_a_warm_fit_spends_its_time(line):
     measurement, name = spectral_measurement()
-    settings = {"objective": "l2"}
-    fit(measurement, MODEL, **settings)
-    stages: list[tuple[str, float]] = []
-    begin = time.perf_counter()
+    options = FitOptions(objective="l2")
+    fit(measurement, MODEL, options)
+    whole, _ = timed(lambda: fit(measurement, MODEL, options), 5)
+    plain, _ = timed(lambda: fit(measurement, MODEL, options, cross_validate=False), 5)
+    marks = [("selecting rows", time.perf_counter())]
     fit(
-        measurement, MODEL, **settings,
-        progress=lambda what: stages.append((what, time.perf_counter())),
+        measurement, MODEL, options, cross_validate=False,
+        progress=lambda what: marks.append((what, time.perf_counter())),
     )  # fmt: skip
-    end = time.perf_counter()
+    marks.append(("", time.perf_counter()))
     with jax.enable_x64(True):
-        options = FitOptions(**settings)
         rows = select_rows(measurement, options.max_theta_deg)
         problem = prepare(rows, Model(MODEL), options)
         points, x = best_starts(problem, 1)
@@ -280,11 +273,11 @@ def test_where_a_warm_fit_spends_its_time(line):
         alone, _ = timed(
             lambda: jax.block_until_ready(refine(problem, *start)), OURS_REPEATS
         )
-    line(f"one warm fit() of {name}, {rows.value.shape[0]} x {rows.value.shape[1]}")
-    marks = [("selecting rows", begin), *stages, ("", end)]
-    for (what, at), (_, until) in zip(marks, marks[1:], strict=False):
-        shown = "leaving out each angle, scores, diagnostics" if "leaving" in what else what
-        line(f"  {shown:44} {until - at:9.4f}")
-    line(f"  {'all of fit()':44} {end - begin:9.4f}")
+    line(f"warm fit() of {name}, {rows.value.shape[0]} x {rows.value.shape[1]}, seconds")
     line(f"  {'refine alone, from one start':44} {alone:9.4f}")
-    assert alone < end - begin
+    line(f"  {'fit()':44} {whole:9.4f}")
+    line(f"  {'fit(cross_validate=False)':44} {plain:9.4f}, of which once")
+    for (what, at), (_, until) in pairwise(marks):
+        more = ", scores, diagnostics" if what == "uncertainties" else ""
+        line(f"    {what + more:42} {until - at:9.4f}")
+    assert alone < plain
