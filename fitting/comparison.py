@@ -49,9 +49,10 @@ def compare(
 ) -> Comparison:
     """Fit every model and keep the smallest one that predicts as well as the best.
 
-    As well means: its held-out error, angle of incidence by angle of incidence, exceeds
-    that of the best by less than one standard error of the difference (the rule of
-    Breiman et al. 1984, Classification and Regression Trees, sec. 3.4.3, paired).
+    As well means: the ratio of its held-out error to that of the best, angle of incidence
+    by angle of incidence, is above 1 by less than one standard error (the rule of Breiman
+    et al. 1984, Classification and Regression Trees, sec. 3.4.3, paired). Ratios, because
+    the most grazing angle has errors many times those of the others and would decide alone.
     """
     say = progress or (lambda _: None)
 
@@ -77,14 +78,14 @@ def choose(results: tuple[FitResult, ...]) -> tuple[int, str]:
             "incidence, more parameters always look better"
         )
     errors = np.asarray([h for h in held if h is not None])
-    total = [r.cross_validation.objective for r in results if r.cross_validation]
+    total = np.exp(errors.mean(axis=1))
     top = int(np.argmin(total))
     near = [i for i in range(len(results)) if i == top or _as_good(errors[i], errors[top])]
     best = min(near, key=lambda i: (n_free(results[i]), total[i]))
     name, number = results[best].model, n_free(results[best])
     if best == top:
         larger = [i for i in near if i != best and n_free(results[i]) > number]
-        why = f"{name} has the smallest held-out error ({total[best]:.4g})"
+        why = f"{name} has the smallest typical held-out error ({total[best]:.3g})"
         if larger:
             why += ", and no larger model predicts better"
         return best, why
@@ -92,19 +93,20 @@ def choose(results: tuple[FitResult, ...]) -> tuple[int, str]:
     return best, (
         f"{name} with {number} parameters predicts unseen angles as well as "
         f"{results[top].model} with {n_free(results[top])} (whose held-out error is "
-        f"{gain:.1f} % smaller, within one standard error)"
+        f"typically {gain:.1f} % smaller, within one standard error)"
     )
 
 
 def _held_out(result: FitResult) -> np.ndarray | None:
+    """Logarithms of the held-out error per angle of incidence."""
     if result.cross_validation is None:
         return None
-    return np.asarray([a.objective**2 for a in result.cross_validation.by_angle])
+    errors = [a.objective for a in result.cross_validation.by_angle]
+    return np.log(np.maximum(errors, 1e-300))
 
 
 def _as_good(errors: np.ndarray, best: np.ndarray) -> bool:
-    difference = errors - best
-    if difference.size < 2:
-        return bool(difference.mean() <= 0)
-    standard_error = difference.std(ddof=1) / math.sqrt(difference.size)
-    return bool(difference.mean() <= standard_error)
+    ratio = errors - best
+    if ratio.size < 2:
+        return bool(ratio.mean() <= 0)
+    return bool(ratio.mean() <= ratio.std(ddof=1) / math.sqrt(ratio.size))

@@ -280,10 +280,9 @@ def _cross_validation(
         squares += errors[-1].l2 ** 2 * held.size
     if not errors:
         return None
-    each = np.asarray([e.objective for e in errors])
     return CrossValidation(
         objective=math.sqrt(total / max(count, 1)),
-        standard_error=float(each.std(ddof=1) / math.sqrt(each.size)),
+        typical=math.exp(np.mean([math.log(max(e.objective, 1e-300)) for e in errors])),
         l2=math.sqrt(squares / rows.index.size),
         by_angle=errors,
     )

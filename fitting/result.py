@@ -94,12 +94,12 @@ class ChannelError(msgspec.Struct, frozen=True):
 class CrossValidation(msgspec.Struct, frozen=True):
     """Errors on incidence angles that the fit did not see, each left out in turn.
 
-    ``objective`` is the RMS over all held-out rows, ``standard_error`` that of the mean
-    over the angles, ``l2`` as in `Scores`.
+    ``objective`` is the RMS over all held-out rows, ``typical`` the geometric mean of the
+    angles' RMS values, by which models are compared, ``l2`` as in `Scores`.
     """
 
     objective: float
-    standard_error: float
+    typical: float
     l2: float
     by_angle: list[AngleError]
 

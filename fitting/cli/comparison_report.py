@@ -31,7 +31,8 @@ def show(out: Console, done: Comparison) -> None:
         )
     out.print(rows)
     _by_angle(out, done)
-    out.print(f"\n* kept: {done.reason}")
+    out.print("\nheld-out: typical RMS at an angle of incidence that was not fitted")
+    out.print(f"* kept: {done.reason}")
 
 
 def _score(result: FitResult) -> float | None:
@@ -45,7 +46,7 @@ def _held_out(result: FitResult) -> str:
     validation = result.cross_validation
     if validation is None:
         return "-"
-    return f"{validation.objective:.3g} (se {validation.standard_error:.1g})"
+    return number(validation.typical, 3)
 
 
 def _by_angle(out: Console, done: Comparison) -> None:

@@ -58,7 +58,10 @@ def row(folder: Path, name: str) -> str:
 
 def names(folder: Path) -> list[str]:
     """All files of the two instruments, in order."""
-    found = [*sorted(folder.glob("cornell/*.astm")), *sorted(folder.glob("minidiff/*.astm"))]
+    found = [
+        *sorted(folder.glob("cornell/*.astm")),
+        *sorted(folder.glob("minidiff/*.astm")),
+    ]
     return [f"{path.parent.name}/{path.stem}" for path in found]
 
 
