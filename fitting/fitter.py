@@ -13,6 +13,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.typing import ArrayLike
 
 from data_formats import Measurement
 from fitting import diagnostics, judge, problem, starts, summary
@@ -176,7 +177,7 @@ def _search_all(rows: Rows, model: Model, options: FitOptions) -> list[Found]:
 
 
 def _search(
-    p: Problem, options: FitOptions, also: tuple[np.ndarray, np.ndarray] | None = None
+    p: Problem, options: FitOptions, also: tuple[ArrayLike, ArrayLike] | None = None
 ) -> Found:
     count = max(1, options.starts) if p.unknowns.n_shape else 1
     points, x = starts.best_starts(p, count)

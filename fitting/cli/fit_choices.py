@@ -109,7 +109,7 @@ class Choices:
     ] = None  # fmt: skip
     starts: Annotated[
         int | None,
-        Parameter(group=_SEARCH, help="Starting points refined to the end (4)."),
+        Parameter(group=_SEARCH, help="Starting points refined to the end (8)."),
     ] = None
     cv: Annotated[
         bool | None,

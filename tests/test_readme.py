@@ -1,0 +1,104 @@
+"""What the README claims is executed here."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.M | re.S)
+
+
+def test_the_two_commands_are_one_line_each_and_ci_runs_the_second():
+    first, second = blocks("sh")
+    assert first.count("\n") == second.count("\n") == 1
+    assert first.rstrip().endswith(".venv/bin/brdf fit")
+    assert second.rstrip().endswith("-m pytest")
+    script = ROOT / ".ci" / "run"
+    if script.exists():
+        assert "README.md" in script.read_text()
+
+
+def test_the_excerpt_is_what_the_command_prints(tmp_path, monkeypatch, capsys):
+    from fitting.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    assert main(["fit"]) == 0
+    printed = [line.split() for line in capsys.readouterr().out.splitlines()]
+    (excerpt,) = blocks("text")
+    for line in excerpt.splitlines():
+        assert line.split() in printed, line
+    assert (tmp_path / "two_lobe_paint.fit.json").exists()
+
+
+def test_the_python_example_runs(tmp_path, monkeypatch, capsys):
+    from data_formats import read, write
+    from fitting.sample import sample_path
+
+    monkeypatch.chdir(tmp_path)
+    write(read(sample_path()), "paint.astm")
+    (example,) = blocks("python")
+    exec(compile(example, "README", "exec"), {})
+    assert (tmp_path / "paint.fit.json").exists()
+    assert capsys.readouterr().out.startswith("[0.")
+
+
+def test_every_command_that_is_named_exists():
+    named = set(re.findall(r"`brdf ([a-z]+)", README))
+    shown = subprocess.run(
+        [sys.executable, "-m", "fitting", "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert named
+    for name in named:
+        assert re.search(rf"\b{name}\b", shown), name
+
+
+def test_linked_files_exist():
+    for target in re.findall(r"\]\(((?!http)[^)]+)\)", README):
+        assert (ROOT / target).exists(), target
+    assert (ROOT / "fitting" / "fit_result.schema.json").exists()
+
+
+def test_the_picture_is_drawn_by_its_script(tmp_path, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    sys.path.insert(0, str(ROOT / "notebooks"))
+    try:
+        import readme_picture
+    finally:
+        sys.path.pop(0)
+    readme_picture.draw(tmp_path / "picture.png")
+    assert (tmp_path / "picture.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_the_table_of_real_files_is_current(real_data):
+    """Every number of the table, to 1 %, and the promises made with it."""
+    sys.path.insert(0, str(ROOT / "tests" / "benchmarks"))
+    try:
+        import real_files
+    finally:
+        sys.path.pop(0)
+    table = re.search(r"<!-- table -->\n(.*?)\n<!-- /table -->", README, re.S)
+    assert table
+    shown = {line.split("|")[1].strip(): line for line in table[1].splitlines()[2:]}
+    assert set(shown) == set(real_files.names(real_data))
+    for name, line in shown.items():
+        theirs = [c.strip() for c in line.split("|")[1:-1]]
+        ours = [c.strip() for c in real_files.row(real_data, name).split("|")[1:-1]]
+        assert theirs[:3] == ours[:3]
+        for a, b in zip(theirs[3:7], ours[3:7], strict=True):
+            assert float(a) == pytest.approx(float(b), rel=0.01), name
+        if name in real_files.OTHERS:
+            assert min(map(float, ours[4:7])) < real_files.OTHERS[name].l2
