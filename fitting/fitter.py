@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from importlib.metadata import version
 from typing import Any
 
@@ -13,21 +13,17 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.typing import ArrayLike
 
 from data_formats import Measurement
-from fitting import diagnostics, judge, problem, starts, summary
+from fitting import diagnostics, judge, problem, summary
 from fitting.albedo import model_albedo
 from fitting.model import Model
 from fitting.options import FitOptions
 from fitting.predict import predict_geometry
-from fitting.problem import Rows, prepare, reciprocity_pairs, select_rows
-from fitting.reduced import Problem
+from fitting.problem import Rows, reciprocity_pairs, select_rows
 from fitting.result import (
     SCHEMA_VERSION,
-    AngleError,
     Channel,
-    CrossValidation,
     Data,
     DataAlbedo,
     DataNote,
@@ -38,14 +34,13 @@ from fitting.result import (
     Settings,
     Solver,
 )
-from fitting.solve import Solution, refine
+from fitting.search import again, robust_width, search
 from fitting.summary import Found, joined_values
 from fitting.uncertainty import covariance
+from fitting.validation import cross_validation
 
 Progress = Callable[[str], None]
 _SAME_COST = 1e-6
-_MAD_TO_SIGMA = 1.4826
-_HUBER = 1.345
 _DENSE_NODES = 32
 
 
@@ -89,18 +84,18 @@ def _fit(
     names = [c.name for c in measurement.channels]
     objective = problem.resolve_objective(options.objective, rows.sigma is not None)
     say("searching for the shape")
-    found = _search_all(rows, model, options)
+    found = search(rows, model, options)
     width = math.inf
     if options.robust:
         say("again with robust residuals")
-        width = _robust_width(rows, model, objective, options, found)
-        found = _again(rows, model, options, found, robust_width=width)
+        width = robust_width(rows, model, objective, options, found)
+        found = again(rows, model, options, found, robust_width=width)
     energy_active = False
     wants_energy = options.energy != "hard" and float(options.energy) > 0
     one_sided = not all(lobe.RECIPROCAL for lobe in model.lobes) and options.reciprocity > 0
     if (wants_energy and _worst_albedo(model, found)[0] > 1.0) or one_sided:
         say("again with the penalties")
-        found = _again(rows, model, options, found, robust_width=width, penalised=True)
+        found = again(rows, model, options, found, robust_width=width, penalised=True)
         energy_active = wants_energy
     say("uncertainties")
     covariances = [covariance(f.problem, f.solution) for f in found]
@@ -110,7 +105,7 @@ def _fit(
     validation = None
     if cross_validate:
         say("leaving out each angle of incidence")
-        validation = _cross_validation(rows, model, objective, options, found, width)
+        validation = cross_validation(rows, model, objective, options, found, width)
     parameters, correlations, words = summary.parameters(model, found, covariances, names)
     albedo, theta, worst_channel = _worst_albedo(model, found)
     return FitResult(
@@ -145,70 +140,6 @@ def _fit(
         versions=_versions(),
         references=sorted({lobe.REFERENCE for lobe in model.lobes}),
     )  # fmt: skip
-
-
-def _problems(
-    rows: Rows, model: Model, options: FitOptions, **kwargs: Any
-) -> Iterator[Problem]:
-    """One problem, or one per channel where each has its own shape."""
-    whole = prepare(rows, model, options, **kwargs)
-    if not options.per_channel_shape:
-        yield whole
-        return
-    for c in range(whole.target.shape[0]):
-        yield problem.for_channel(whole, c)
-
-
-def _search_all(rows: Rows, model: Model, options: FitOptions) -> list[Found]:
-    """The best minimum of every problem, each from its own starts.
-
-    Channels with a shape of their own also start from the shape that they share best, so
-    that they never end up worse than with it.
-    """
-    if not options.per_channel_shape:
-        return [_search(p, options) for p in _problems(rows, model, options)]
-    together = dataclasses.replace(options, per_channel_shape=False)
-    (shared,) = _search_all(rows, model, together)
-    u, x = shared.solution.u, shared.solution.x
-    return [
-        _search(p, options, (u, x[c : c + 1]))
-        for c, p in enumerate(_problems(rows, model, options))
-    ]
-
-
-def _search(
-    p: Problem, options: FitOptions, also: tuple[ArrayLike, ArrayLike] | None = None
-) -> Found:
-    count = max(1, options.starts) if p.unknowns.n_shape else 1
-    points, x = starts.best_starts(p, count)
-    begin = [*zip(points, x, strict=True), *([also] if also else [])]
-    ends = [jax.device_get(refine(p, jnp.asarray(u), jnp.asarray(c))) for u, c in begin]
-    return _best(p, ends)
-
-
-def _best(p: Problem, ends: list[Solution]) -> Found:
-    cost = [float(e.cost) if math.isfinite(e.cost) else math.inf for e in ends]
-    return Found(p, ends[int(np.argmin(cost))], tuple(ends))
-
-
-def _again(
-    rows: Rows, model: Model, options: FitOptions, found: list[Found], **kwargs: Any
-) -> list[Found]:
-    """Refit with other residuals, from every end: the order of the minima may change."""
-    out: list[Found] = []
-    for p, before in zip(_problems(rows, model, options, **kwargs), found, strict=True):
-        begin = [(jnp.asarray(e.u), jnp.asarray(e.x)) for e in before.ends]
-        out.append(_best(p, [jax.device_get(refine(p, u, x)) for u, x in begin]))
-    return out
-
-
-def _robust_width(
-    rows: Rows, model: Model, objective: str, options: FitOptions, found: list[Found]
-) -> float:
-    predicted = predict_geometry(model, joined_values(found), rows.geometry)
-    r = judge.residuals(rows, predicted, objective, options)[rows.valid]
-    spread = _MAD_TO_SIGMA * float(np.median(np.abs(r - np.median(r))))
-    return _HUBER * spread if spread > 0 else math.inf
 
 
 def _worst_albedo(model: Model, found: list[Found]) -> tuple[float, float, int]:
@@ -248,44 +179,6 @@ def _reciprocity(
         float(np.max(np.abs(there - back) / size)),
         by_construction,
         None if by_construction else options.reciprocity,
-    )
-
-
-def _cross_validation(
-    rows: Rows,
-    model: Model,
-    objective: str,
-    options: FitOptions,
-    found: list[Found],
-    width: float,
-) -> CrossValidation | None:
-    """Refit without each angle of incidence, from the minimum of the whole."""
-    theta = judge.theta_i_of(rows)
-    errors: list[AngleError] = []
-    total, count, squares = 0.0, 0, 0.0
-    for held in judge.folds(rows):
-        keep = np.ones(rows.index.size)
-        keep[held] = 0.0
-        ends = []
-        kwargs: dict[str, Any] = {"robust_width": width, "row_weights": keep}
-        kwargs["penalised"] = found[0].problem.penalised
-        for p, f in zip(_problems(rows, model, options, **kwargs), found, strict=True):
-            u, x = jnp.asarray(f.solution.u), jnp.asarray(f.solution.x)
-            ends.append(Found(p, jax.device_get(refine(p, u, x)), ()))
-        predicted = predict_geometry(model, joined_values(ends), rows.geometry)
-        predicted = np.broadcast_to(predicted, rows.value.shape)
-        r = judge.residuals(rows, predicted, objective, options)
-        errors.append(judge.angle_error(rows, r, predicted, theta, held))
-        total += float(np.sum(r[held] ** 2))
-        count += int(rows.valid[held].sum())
-        squares += errors[-1].l2 ** 2 * held.size
-    if not errors:
-        return None
-    return CrossValidation(
-        objective=math.sqrt(total / max(count, 1)),
-        typical=math.exp(np.mean([math.log(max(e.objective, 1e-300)) for e in errors])),
-        l2=math.sqrt(squares / rows.index.size),
-        by_angle=errors,
     )
 
 

@@ -1,4 +1,4 @@
-"""Blinn-Phong: a power of the half vector's cosine, for comparison with older fits."""
+"""Blinn-Phong: a power of the half vector's cosine, for metal flakes and older fits."""
 
 from __future__ import annotations
 

@@ -1,0 +1,90 @@
+"""The search for the best minimum of a problem, and of its variations."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
+
+from fitting import judge, starts
+from fitting.model import Model
+from fitting.options import FitOptions
+from fitting.predict import predict_geometry
+from fitting.problem import Rows, for_channel, prepare
+from fitting.reduced import Problem
+from fitting.solve import Solution, refine
+from fitting.summary import Found, joined_values
+
+_MAD_TO_SIGMA = 1.4826
+_HUBER = 1.345
+
+
+def problems(
+    rows: Rows, model: Model, options: FitOptions, **kwargs: Any
+) -> Iterator[Problem]:
+    """One problem, or one per channel where each has its own shape."""
+    whole = prepare(rows, model, options, **kwargs)
+    if not options.per_channel_shape:
+        yield whole
+        return
+    for c in range(whole.target.shape[0]):
+        yield for_channel(whole, c)
+
+
+def search(rows: Rows, model: Model, options: FitOptions) -> list[Found]:
+    """The best minimum of every problem, each from its own starts.
+
+    Channels with a shape of their own also start from the shape that they share best, so
+    that they never end up worse than with it.
+    """
+    if not options.per_channel_shape:
+        return [_search_one(p, options) for p in problems(rows, model, options)]
+    together = dataclasses.replace(options, per_channel_shape=False)
+    (shared,) = search(rows, model, together)
+    u, x = shared.solution.u, shared.solution.x
+    return [
+        _search_one(p, options, (u, x[c : c + 1]))
+        for c, p in enumerate(problems(rows, model, options))
+    ]
+
+
+def _search_one(
+    p: Problem, options: FitOptions, also: tuple[ArrayLike, ArrayLike] | None = None
+) -> Found:
+    count = max(1, options.starts) if p.unknowns.n_shape else 1
+    points, x = starts.best_starts(p, count)
+    begin = [*zip(points, x, strict=True), *([also] if also else [])]
+    ends = [jax.device_get(refine(p, jnp.asarray(u), jnp.asarray(c))) for u, c in begin]
+    return _best(p, ends)
+
+
+def _best(p: Problem, ends: list[Solution]) -> Found:
+    cost = [float(e.cost) if math.isfinite(e.cost) else math.inf for e in ends]
+    return Found(p, ends[int(np.argmin(cost))], tuple(ends))
+
+
+def again(
+    rows: Rows, model: Model, options: FitOptions, found: list[Found], **kwargs: Any
+) -> list[Found]:
+    """Refit with other residuals, from every end: the order of the minima may change."""
+    out: list[Found] = []
+    for p, before in zip(problems(rows, model, options, **kwargs), found, strict=True):
+        begin = [(jnp.asarray(e.u), jnp.asarray(e.x)) for e in before.ends]
+        out.append(_best(p, [jax.device_get(refine(p, u, x)) for u, x in begin]))
+    return out
+
+
+def robust_width(
+    rows: Rows, model: Model, objective: str, options: FitOptions, found: list[Found]
+) -> float:
+    """Width of the pseudo-Huber residual: 1.345 robust standard deviations of a fit's."""
+    predicted = predict_geometry(model, joined_values(found), rows.geometry)
+    r = judge.residuals(rows, predicted, objective, options)[rows.valid]
+    spread = _MAD_TO_SIGMA * float(np.median(np.abs(r - np.median(r))))
+    return _HUBER * spread if spread > 0 else math.inf
