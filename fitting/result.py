@@ -233,6 +233,11 @@ class FitResult(msgspec.Struct, frozen=True):
     versions: dict[str, str]
     references: list[str]
 
+    def __str__(self) -> str:
+        from fitting.describe import describe
+
+        return describe(self)
+
     @property
     def values(self) -> dict[str, np.ndarray]:
         """Parameters by name, as `fitting.Model` takes them."""

@@ -67,6 +67,15 @@ def test_result_says_what_a_user_asks(result, paint):
     assert result.scores.log1p < 0.01
 
 
+def test_printing_a_result_shows_values_with_uncertainties(result):
+    text = str(result)
+    assert "lambert + ggx, 3 channels" in text
+    alpha = result.parameter("ggx.alpha")
+    assert f"{alpha.value[0]:.3f}" in text
+    assert text.count("±") == 10
+    assert "starts agree" in text
+
+
 def test_json_round_trip_is_exact_and_valid(result, tmp_path):
     path = tmp_path / "paint.fit.json"
     result.save(path)

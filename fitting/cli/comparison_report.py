@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from rich.console import Console
 
-from fitting.cli.quantities import degrees, number
 from fitting.cli.terminal import heading, table
 from fitting.comparison import Comparison, n_free
+from fitting.quantities import degrees, number
 from fitting.result import FitResult
 
 _MOST_COLUMNS = 5

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from fitting.cli.quantities import degrees, number, percent, shown_channels
 from fitting.cli.terminal import heading, table
+from fitting.quantities import degrees, number, percent, shown_channels
 from fitting.result import AngleError, ChannelError, Colour, FitResult, Scores
 
 _MOST_ANGLES = 12

@@ -8,10 +8,10 @@ from rich.text import Text
 from data_formats import Measurement
 from fitting.cli import comparison_report, error_report, parameter_report
 from fitting.cli.flags import Flags
-from fitting.cli.quantities import channel_span, count, number, percent
 from fitting.cli.terminal import bullet, heading
 from fitting.cli.verdict import Verdict, judge
 from fitting.comparison import Comparison
+from fitting.quantities import channel_span, count, number, percent
 from fitting.result import FitResult
 
 

@@ -78,8 +78,8 @@ def _origin(out: Console, s: dict[str, Any], everything: bool) -> None:
 
 
 def _geometry(out: Console, s: dict[str, Any]) -> None:
-    from fitting.cli.quantities import count, degrees, percent, valid_share
     from fitting.cli.terminal import heading, table
+    from fitting.quantities import count, degrees, percent, valid_share
 
     out.print(heading("Geometry, by angle of incidence"))
     rows = table(
@@ -118,8 +118,8 @@ def _geometry(out: Console, s: dict[str, Any]) -> None:
 
 
 def _values(out: Console, s: dict[str, Any], everything: bool) -> None:
-    from fitting.cli.quantities import number, shown_channels, valid_share
     from fitting.cli.terminal import heading, table
+    from fitting.quantities import number, shown_channels, valid_share
 
     out.print(heading("Values, 1/sr, without cosine"))
     rows = table("channel", "valid", "minimum", "median", "maximum")
@@ -141,8 +141,8 @@ def _values(out: Console, s: dict[str, Any], everything: bool) -> None:
 
 
 def _quality(out: Console, s: dict[str, Any]) -> None:
-    from fitting.cli.quantities import count, percent
     from fitting.cli.terminal import bullet, heading
+    from fitting.quantities import count, percent
 
     out.print(heading("Quality"))
     r = s["reciprocity"]

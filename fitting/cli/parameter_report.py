@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from rich.console import Console
 
-from fitting.cli.quantities import number, shown_channels, with_uncertainty
 from fitting.cli.terminal import table
+from fitting.quantities import number, shown_channels, with_uncertainty
 from fitting.result import FitResult, ParameterResult
 
 _COLUMN = 19

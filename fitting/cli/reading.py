@@ -61,7 +61,7 @@ def stem(path: Path) -> str:
 
 def headline(measurement: Measurement, path: Path) -> str:
     """One line on what the data are."""
-    from fitting.cli.quantities import channel_span, count
+    from fitting.quantities import channel_span, count
 
     names = [c.name for c in measurement.channels]
     sample = measurement.provenance.sample

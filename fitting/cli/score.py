@@ -52,9 +52,9 @@ def score(
         sys.stdout.write(json_module.dumps(plain, indent=1, allow_nan=False) + "\n")
         return 0
     from fitting.cli import error_report
-    from fitting.cli.quantities import count, percent
     from fitting.cli.terminal import stdout
     from fitting.cli.verdict import typical_deviation
+    from fitting.quantities import count, percent
 
     out = stdout()
     same = measurement.provenance.sha256 == fitted.data.sha256

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from data_formats import Measurement
-from fitting.cli.quantities import degrees, percent
+from fitting.quantities import degrees, percent
 from fitting.result import FitResult
 
 Level = Literal["good", "fair", "poor"]

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fitting.cli import quantities as q
+from fitting import quantities as q
 
 
 @pytest.mark.parametrize(
