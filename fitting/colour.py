@@ -11,19 +11,26 @@ from fitting.result import Colour
 
 ILLUMINANT = "D65"
 OBSERVER = "CIE 1931 2 Degree Standard Observer"
+_VISIBLE = (380.0, 780.0)
 
 
-def colour_difference(wavelengths: np.ndarray, rows: Rows, predicted: np.ndarray) -> Colour:
+def colour_difference(
+    wavelengths: np.ndarray, rows: Rows, predicted: np.ndarray
+) -> Colour | None:
     """CIE Delta E 2000 of reflectance factors ``pi f``, row by row, under D65.
 
-    Only rows whose whole spectrum is valid count. The spectra are interpolated to 5 nm
-    over their own range, which is stated; L*a*b* is relative to the illuminant over the
-    same range. Needs at least five wavelengths.
+    Only rows whose whole visible spectrum is valid count. The spectra are interpolated to
+    5 nm over their own range within 380 to 780 nm, which is stated; L*a*b* is relative to
+    the illuminant over the same range. None with fewer than five visible wavelengths, or
+    without a complete row.
     """
-    if wavelengths.size < 5:
-        raise ValueError(
-            f"{wavelengths.size} wavelengths are too few for a colour; needs 5"
-        )
+    order = np.argsort(wavelengths)
+    visible = (wavelengths[order] >= _VISIBLE[0]) & (wavelengths[order] <= _VISIBLE[1])
+    order = order[visible]
+    full = rows.valid[:, order].all(axis=1)
+    if order.size < 5 or not full.any():
+        return None
+    wavelengths = wavelengths[order]
     with warnings.catch_warnings():
         # It warns about optional packages of its own plots, which are not used here.
         warnings.simplefilter("ignore")
@@ -39,14 +46,13 @@ def colour_difference(wavelengths: np.ndarray, rows: Rows, predicted: np.ndarray
     weights = weights / weights[:, 1].sum()
     white = weights.sum(axis=0)
     white_xy = white[:2] / white.sum()
-    full = rows.valid.all(axis=1)
 
     def lab(values: np.ndarray) -> np.ndarray:
         factor = np.pi * np.stack([np.interp(grid, wavelengths, v) for v in values])
         return colour.XYZ_to_Lab(factor @ weights, white_xy)
 
     difference = colour.delta_E(
-        lab(rows.value[full]), lab(predicted[full]), method="CIE 2000"
+        lab(rows.value[full][:, order]), lab(predicted[full][:, order]), method="CIE 2000"
     )
     return Colour(
         illuminant=ILLUMINANT,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from data_formats import Measurement
+from fitting.expression import ModelError
 from fitting.fitter import Progress, fit
 from fitting.options import FitOptions
 from fitting.result import FitResult
@@ -41,7 +43,7 @@ def n_free(result: FitResult) -> int:
 
 def compare(
     measurement: Measurement,
-    models: tuple[str, ...] = DEFAULT_MODELS,
+    models: Sequence[str] | str = DEFAULT_MODELS,
     options: FitOptions | None = None,
     *,
     progress: Progress | None = None,
@@ -54,6 +56,9 @@ def compare(
     et al. 1984, Classification and Regression Trees, sec. 3.4.3, paired). Ratios, because
     the most grazing angle has errors many times those of the others and would decide alone.
     """
+    if not models:
+        raise ModelError("no model to compare; leave models out for the default ones")
+    models = [models] if isinstance(models, str) else models
     say = progress or (lambda _: None)
 
     def one(model: str) -> FitResult:

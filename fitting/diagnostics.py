@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from data_formats import Measurement
-from fitting.solid_angle import incidence_labels, solid_angles
+from fitting.solid_angle import angle_labels, incidence_labels, solid_angles
 
 _SAME_DIRECTION = 1e-3
 _WIDEST_GAP = np.radians(20.0)
@@ -18,9 +18,9 @@ def data_albedo(m: Measurement) -> list[tuple[float, float, float]]:
 
     ``albedo`` is the sum of value times projected solid angle over the reflected rows, the
     largest of all channels; ``covered`` the share of the projected hemisphere (pi) that
-    the rows stand for. Rows that are not valid count as not measured.
+    the valid rows of that channel stand for.
     """
-    up = (m.theta_r <= 0.5 * np.pi) & m.valid.any(axis=1)
+    up = _reflected(m)
     label = incidence_labels(m.theta_i)
     out: list[tuple[float, float, float]] = []
     for k in np.unique(label[up]):
@@ -30,13 +30,10 @@ def data_albedo(m: Measurement) -> list[tuple[float, float, float]]:
             continue
         projected = angle * np.cos(m.theta_r[rows])
         value = np.where(m.valid[rows], m.value[rows], 0.0)
-        out.append(
-            (
-                float(m.theta_i[rows].mean()),
-                float((projected @ value).max()),
-                float(projected.sum() / np.pi),
-            )
-        )
+        albedo = projected @ value
+        covered = projected @ m.valid[rows] / np.pi
+        top = int(np.argmax(albedo))
+        out.append((float(m.theta_i[rows].mean()), float(albedo[top]), float(covered[top])))
     return out
 
 
@@ -48,7 +45,7 @@ def data_reciprocity(m: Measurement) -> tuple[float, int] | None:
     over the mean of the channels. Gaps of more than 20 deg are not bridged. None where the
     sampling leaves no pair.
     """
-    up = (m.theta_r <= 0.5 * np.pi) & m.valid.any(axis=1)
+    up = _reflected(m)
     label = incidence_labels(m.theta_i)
     count = np.maximum(m.valid.sum(axis=1), 1)
     mean = np.where(m.valid, m.value, 0.0).sum(axis=1) / count
@@ -59,6 +56,8 @@ def data_reciprocity(m: Measurement) -> tuple[float, int] | None:
         # Both halves folded onto one: isotropic data are compared as if symmetric.
         delta = np.abs(np.arctan2(*_sin_cos(m.phi_r[rows] - m.phi_i[rows])))
         table = _Rings.of(m.theta_r[rows], delta, mean[rows])
+        if table.theta.size < 3:
+            continue
         tables.append((float(m.theta_i[rows].mean()), table))
     differences: list[np.ndarray] = []
     for i, (a, of_a) in enumerate(tables):
@@ -73,6 +72,11 @@ def data_reciprocity(m: Measurement) -> tuple[float, int] | None:
     return float(np.median(joined)), int(joined.size)
 
 
+def _reflected(m: Measurement) -> np.ndarray:
+    horizon = 0.5 * np.pi + 1e-9
+    return (m.theta_i <= horizon) & (m.theta_r <= horizon) & m.valid.any(axis=1)
+
+
 @dataclass(frozen=True)
 class _Rings:
     """A table of one incidence: polar angles, and per ring azimuths and values."""
@@ -82,7 +86,7 @@ class _Rings:
 
     @staticmethod
     def of(theta: np.ndarray, delta: np.ndarray, value: np.ndarray) -> _Rings:
-        ring = incidence_labels(theta)
+        ring = angle_labels(theta)
         levels, rings = [], []
         for k in range(ring.max() + 1):
             rows = np.flatnonzero(ring == k)

@@ -17,10 +17,11 @@ import numpy as np
 from data_formats import Measurement
 from fitting import diagnostics, judge, problem, summary
 from fitting.albedo import model_albedo
+from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions
 from fitting.predict import predict_geometry
-from fitting.problem import Rows, reciprocity_pairs, select_rows
+from fitting.problem import Rows, reciprocity_pairs, select_rows, with_noise_of
 from fitting.result import (
     SCHEMA_VERSION,
     Channel,
@@ -41,7 +42,9 @@ from fitting.validation import cross_validation
 
 Progress = Callable[[str], None]
 _SAME_COST = 1e-6
+_ROUNDING = 1e-16
 _DENSE_NODES = 32
+_NOISE_ROUNDS = 2
 
 
 def fit(
@@ -64,6 +67,9 @@ def fit(
     Raises `MeasurementError` if no row is left to fit and `ModelError` for a senseless
     model or option. Runs in float64 without changing JAX's configuration.
     """
+    unknown = set(settings) - {f.name for f in dataclasses.fields(FitOptions)}
+    if unknown:
+        raise ModelError(f"fit has no option {', '.join(sorted(unknown))}; see FitOptions")
     options = dataclasses.replace(options or FitOptions(), **settings)
     model = model if isinstance(model, Model) else Model(model)
     say = progress or (lambda _: None)
@@ -85,6 +91,11 @@ def _fit(
     objective = problem.resolve_objective(options.objective, rows.sigma is not None)
     say("searching for the shape")
     found = search(rows, model, options)
+    if objective == "chi2" and (rows.sigma is None or options.noise is not None):
+        # Weights from noisy values favour the low ones; weights from the fit do not.
+        for _ in range(_NOISE_ROUNDS):
+            rows = with_noise_of(rows, _predicted(model, found, rows))
+            found = again(rows, model, options, found)
     width = math.inf
     if options.robust:
         say("again with robust residuals")
@@ -93,21 +104,26 @@ def _fit(
     energy_active = False
     wants_energy = options.energy != "hard" and float(options.energy) > 0
     one_sided = not all(lobe.RECIPROCAL for lobe in model.lobes) and options.reciprocity > 0
-    if (wants_energy and _worst_albedo(model, found)[0] > 1.0) or one_sided:
+    exceeds = wants_energy and _worst_albedo(model, found)[0] > 1.0
+    if exceeds or one_sided:
         say("again with the penalties")
         found = again(rows, model, options, found, robust_width=width, penalised=True)
-        energy_active = wants_energy
+        energy_active = exceeds
     say("uncertainties")
     covariances = [covariance(f.problem, f.solution) for f in found]
     values = joined_values(found)
-    predicted = predict_geometry(model, values, rows.geometry)
-    predicted = np.broadcast_to(predicted, rows.value.shape)
+    predicted = _predicted(model, found, rows)
     validation = None
     if cross_validate:
         say("leaving out each angle of incidence")
         validation = cross_validation(rows, model, objective, options, found, width)
     parameters, correlations, words = summary.parameters(model, found, covariances, names)
     albedo, theta, worst_channel = _worst_albedo(model, found)
+    if energy_active:
+        words.append(
+            "the energy penalty holds the fit: without it the albedo would exceed 1; the "
+            "uncertainties are those of the data alone"
+        )
     return FitResult(
         schema_version=SCHEMA_VERSION,
         model=model.expression,
@@ -116,7 +132,7 @@ def _fit(
             for c in measurement.channels
         ],
         parameters=parameters,
-        uncertainty_method="row-clustered sandwich, HC3",
+        uncertainty_method="row-clustered sandwich (HC2), t intervals by Satterthwaite",
         correlations=correlations,
         identifiability=words,
         settings=_settings(objective, options),
@@ -140,6 +156,11 @@ def _fit(
         versions=_versions(),
         references=sorted({lobe.REFERENCE for lobe in model.lobes}),
     )  # fmt: skip
+
+
+def _predicted(model: Model, found: list[Found], rows: Rows) -> np.ndarray:
+    predicted = predict_geometry(model, joined_values(found), rows.geometry)
+    return np.broadcast_to(predicted, rows.value.shape)
 
 
 def _worst_albedo(model: Model, found: list[Found]) -> tuple[float, float, int]:
@@ -186,15 +207,17 @@ def _solver(found: list[Found], objective: str) -> Solver:
     converged = all(bool(f.solution.converged) for f in found)
     cost = sum(float(f.solution.cost) for f in found)
     best = [min(f.costs) for f in found]
-    agreeing = min(
-        sum(c <= b * (1 + _SAME_COST) + 1e-300 for c in f.costs)
+    # Costs within rounding of the data are the same, also where the fit is exact.
+    same = [
+        b * (1 + _SAME_COST) + _ROUNDING * float(f.problem.scale)
         for f, b in zip(found, best, strict=True)
-    )
+    ]
+    agreeing = min(sum(c <= s for c in f.costs) for f, s in zip(found, same, strict=True))
     n_starts = min(len(f.costs) for f in found)
     others = [
-        min(c for c in f.costs if c > b * (1 + _SAME_COST)) / b
-        for f, b in zip(found, best, strict=True)
-        if b > 0 and any(b * (1 + _SAME_COST) < c < math.inf for c in f.costs)
+        min(c for c in f.costs if c > s) / b
+        for f, b, s in zip(found, best, same, strict=True)
+        if b > 0 and any(s < c < math.inf for c in f.costs)
     ]
     steps = max(int(f.solution.steps) for f in found)
     after = f"{steps} step{'' if steps == 1 else 's'}"
@@ -206,9 +229,10 @@ def _solver(found: list[Found], objective: str) -> Solver:
         sentence = f"converged in {after}; all {n_starts} starts agree"
     else:
         sentence = (
-            f"converged in {after}; {agreeing} of {n_starts} starts reach the best "
-            f"minimum, the next one costs {min(others, default=math.nan):.4g} times as much"
+            f"converged in {after}; {agreeing} of {n_starts} starts reach the best minimum"
         )
+        if others:
+            sentence += f", the next one costs {min(others):.4g} times as much"
     return Solver(
         sentence=f"{sentence} ({objective})",
         converged=converged,
@@ -264,7 +288,7 @@ def _data(m: Measurement, rows: Rows) -> Data:
 def _colour(measurement: Measurement, rows: Rows, predicted: np.ndarray):
     from fitting.colour import colour_difference
 
-    if measurement.wavelengths is None or measurement.wavelengths.size < 5:
+    if measurement.wavelengths is None:
         return None
     return colour_difference(measurement.wavelengths, rows, predicted)
 

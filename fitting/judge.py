@@ -91,11 +91,11 @@ def by_channel(rows: Rows, predicted: np.ndarray, names: list[str]) -> list[Chan
     for c, name in enumerate(names):
         good = rows.valid[:, c]
         if not good.any():
-            out.append(ChannelError(name, 0.0, 0.0))
+            out.append(ChannelError(name, None, None))
             continue
         rms = float(np.sqrt(np.mean((predicted[good, c] - rows.value[good, c]) ** 2)))
         size = float(np.sqrt(np.mean(rows.value[good, c] ** 2)))
-        out.append(ChannelError(name, rms, rms / size if size > 0 else 0.0))
+        out.append(ChannelError(name, rms, rms / size if size > 0 else None))
     return out
 
 

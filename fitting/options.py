@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from fitting.objectives import ObjectiveName
+from fitting.expression import ModelError
+from fitting.objectives import OBJECTIVES, ObjectiveName
 
 Value = float | np.ndarray
 
@@ -47,3 +49,50 @@ class FitOptions:
     tie: Mapping[str, str] = field(default_factory=dict)
     per_channel_shape: bool = False
     starts: int = 8
+
+    def __post_init__(self) -> None:
+        def refuse(name: str, expected: str) -> None:
+            raise ModelError(
+                f"option {name} is {getattr(self, name)!r}; expected {expected}"
+            )
+
+        if self.objective != "auto" and self.objective not in OBJECTIVES:
+            raise ModelError(
+                f"no objective {self.objective!r}; choose of {', '.join(OBJECTIVES)}, auto"
+            )
+        if self.weights not in ("solid-angle", "rows"):
+            refuse("weights", "'solid-angle' or 'rows'")
+        if not _is_number(self.max_theta_deg) or not 0 < self.max_theta_deg <= 90:
+            refuse("max_theta_deg", "an angle above 0 and up to 90")
+        if self.energy != "hard" and not (_is_number(self.energy) and self.energy >= 0):
+            refuse("energy", "a number from 0 on, or 'hard'")
+        if not _is_number(self.reciprocity) or self.reciprocity < 0:
+            refuse("reciprocity", "a number from 0 on")
+        if (
+            isinstance(self.starts, bool)
+            or not isinstance(self.starts, int)
+            or self.starts < 1
+        ):
+            refuse("starts", "a whole number from 1 on")
+        noise = self.noise
+        if noise is not None and not (
+            len(noise) == 2 and all(_is_number(v) and v >= 0 for v in noise) and any(noise)
+        ):
+            refuse("noise", "two numbers from 0 on, not both 0")
+        for name in ("fix", "bounds", "tie"):
+            if not isinstance(getattr(self, name), Mapping):
+                refuse(name, "a mapping from parameter names")
+        for name, bound in self.bounds.items():
+            if not isinstance(bound, tuple | list) or len(bound) != 2:
+                raise ModelError(f"bounds of {name} are {bound!r}; expected (low, high)")
+            if not all(isinstance(v, int | float) and v == v for v in bound):
+                raise ModelError(f"bounds of {name} are {bound!r}; expected two numbers")
+        for name, text in self.tie.items():
+            if not isinstance(text, str):
+                raise ModelError(f"tie of {name} is {text!r}; expected 'factor*other'")
+
+
+def _is_number(value: object) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return math.isfinite(value)

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from data_formats import Measurement, MeasurementError
 from fitting import geometry, objectives
-from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.objectives import OBJECTIVES
 from fitting.options import FitOptions
@@ -23,6 +22,7 @@ from fitting.unknowns import make_unknowns
 
 _BUCKETS = (128, 256, 512, 1024, 1536, 2048, 3072, 4096)
 _CHUNK = 4096
+_LARGEST = 1e100
 _RECIPROCITY_PAIRS = 256
 
 
@@ -37,6 +37,7 @@ class Rows:
     sigma: np.ndarray | None
     solid_angle: np.ndarray
     left_out: tuple[str, ...]
+    fitted: np.ndarray | None = None
 
 
 def select_rows(measurement: Measurement, max_theta_deg: float) -> Rows:
@@ -46,11 +47,14 @@ def select_rows(measurement: Measurement, max_theta_deg: float) -> Rows:
     """
     m = measurement
     limit = math.radians(max_theta_deg) + 1e-6
-    below = m.theta_r > 0.5 * math.pi + 1e-6
-    grazing = ~below & ((m.theta_i > limit) | (m.theta_r > limit))
-    empty = ~below & ~grazing & ~m.valid.any(axis=1)
-    keep = ~below & ~grazing & ~empty
+    horizon = 0.5 * math.pi + 1e-6
+    from_below = m.theta_i > horizon
+    below = ~from_below & (m.theta_r > horizon)
+    grazing = ~below & ~from_below & ((m.theta_i > limit) | (m.theta_r > limit))
+    empty = ~below & ~from_below & ~grazing & ~m.valid.any(axis=1)
+    keep = ~below & ~from_below & ~grazing & ~empty
     reasons = (
+        (from_below, "rows lit from behind (theta_i > 90 deg), which are not fitted"),
         (below, "transmitted rows (theta_r > 90 deg), which a BRDF does not describe"),
         (grazing, f"rows beyond the grazing cut-off of {max_theta_deg:g} deg"),
         (empty, "rows without a valid value"),
@@ -60,6 +64,12 @@ def select_rows(measurement: Measurement, max_theta_deg: float) -> Rows:
         raise MeasurementError(
             f"{m.provenance.path or 'measurement'}: no row is left to fit "
             f"({'; '.join(left_out) or 'it is empty'}); see `brdf info`"
+        )
+    top = float(np.abs(np.where(m.valid[keep], m.value[keep], 0.0)).max())
+    if top > _LARGEST:
+        raise MeasurementError(
+            f"{m.provenance.path or 'measurement'}: the largest value is {top:.3g} 1/sr; "
+            f"expected a BRDF below {_LARGEST:g}; check the units"
         )
     angles = (m.theta_i[keep], m.phi_i[keep], m.theta_r[keep], m.phi_r[keep])
     return Rows(
@@ -77,8 +87,6 @@ def resolve_objective(name: str, has_sigma: bool) -> str:
     """The objective that ``auto`` stands for."""
     if name == "auto":
         return "chi2" if has_sigma else "log1p"
-    if name not in OBJECTIVES:
-        raise ModelError(f"no objective {name!r}; choose of {', '.join(OBJECTIVES)}, auto")
     return name
 
 
@@ -116,13 +124,23 @@ def residual_terms(rows: Rows, objective: str, options: FitOptions) -> Terms:
 def standard_uncertainty(rows: Rows, options: FitOptions) -> np.ndarray:
     """``sigma (n, c)``: the data's own, or ``sqrt((a y)^2 + b^2)`` from ``noise``.
 
-    Without either, a = 0.02 and b = 0.02 times the median of the values.
+    Without either, a = 0.02 and b = 0.02 times the median of the values. ``y`` is the
+    fitted value where there is one already (`with_noise_of`), the measured one before.
     """
     if rows.sigma is not None and options.noise is None:
         return rows.sigma
-    magnitude = np.abs(np.where(rows.valid, rows.value, 0.0))
-    relative, absolute = options.noise or (0.02, 0.02 * np.median(magnitude[rows.valid]))
-    return np.sqrt((relative * magnitude) ** 2 + absolute**2) + 1e-300
+    value = rows.value if rows.fitted is None else rows.fitted
+    magnitude = np.abs(np.where(rows.valid, value, 0.0))
+    typical = np.median(np.abs(rows.value[rows.valid]))
+    relative, absolute = options.noise or (0.02, 0.02 * typical)
+    # A relative noise alone leaves nothing where the value is 0.
+    floor = 1e-6 * typical + 1e-300
+    return np.sqrt((relative * magnitude) ** 2 + absolute**2 + floor**2)
+
+
+def with_noise_of(rows: Rows, fitted: np.ndarray) -> Rows:
+    """The same rows, whose assumed noise follows a fit instead of the noisy values."""
+    return dataclasses.replace(rows, fitted=fitted)
 
 
 def prepare(

@@ -348,10 +348,10 @@ def _columns(problem: Problem, a: Array, da_dx: Array, da_du: Array) -> tuple[Ar
 def sum_over_rows(
     problem: Problem, u: Array, x: Array, function: Callable[..., tuple[Array, ...]]
 ) -> tuple[Array, ...]:
-    """Sum over blocks of rows of ``function(r, d, columns_x, columns_u)``.
+    """Sum over blocks of rows of ``function(f, r, d, columns_x, columns_u)``.
 
-    ``r, d (c, n)`` are residual and slope, ``columns_x (c, m, n)`` and ``columns_u
-    (c, k, n)`` the derivatives of the model's value in the unknowns.
+    ``f, r, d (c, n)`` are value, residual and slope; ``columns_x (c, m, n)`` and
+    ``columns_u (c, k, n)`` the derivatives of the value in the unknowns.
     """
     a, da_dx, da_du = _amplitudes(problem, u, x)
     to_x, to_u = _columns(problem, a, da_dx, da_du)
@@ -362,6 +362,7 @@ def sum_over_rows(
         f = a @ features[: a.shape[1]]
         r, d = _residual(problem, f, data, jnp.asarray(False))
         return function(
+            f,
             r,
             jnp.broadcast_to(d, r.shape),
             jnp.einsum("cfm,fn->cmn", to_x, features),

@@ -84,11 +84,14 @@ class AngleError(msgspec.Struct, frozen=True):
 
 
 class ChannelError(msgspec.Struct, frozen=True):
-    """Errors of one channel: RMS in 1/sr, and relative to the RMS of the data."""
+    """Errors of one channel: RMS in 1/sr, and relative to the RMS of the data.
+
+    Null for a channel without a valid value, or whose values are all zero.
+    """
 
     channel: str
-    rms: float
-    relative_rms: float
+    rms: float | None
+    relative_rms: float | None
 
 
 class CrossValidation(msgspec.Struct, frozen=True):

@@ -11,7 +11,7 @@ from data_formats import Measurement
 from fitting import judge
 from fitting.expression import ModelError
 from fitting.options import FitOptions
-from fitting.problem import select_rows
+from fitting.problem import select_rows, with_noise_of
 from fitting.result import AngleError, ChannelError, FitResult, Scores, Settings
 
 
@@ -47,6 +47,8 @@ def score(measurement: Measurement, result: FitResult) -> Score:
     )  # fmt: skip
     predicted = np.broadcast_to(predicted, rows.value.shape)
     objective = result.settings.objective
+    if objective == "chi2":
+        rows = with_noise_of(rows, predicted)
     return Score(
         model=result.model,
         rows_used=int(at.size),

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-_SAME_ANGLE = 2e-4
+_SAME_ANGLE = 1e-3
+_BIN = np.radians(1.0)
+_MANY = 90
+_SPARSE = 4.0
 
 
 def solid_angle_weights(
@@ -16,11 +19,13 @@ def solid_angle_weights(
     the mid-angles to the neighbouring rings, times the mid-azimuths to its neighbours on
     the ring. Scattered directions, where rings hold less than three rows on average, get
     the squared distance to their nearest neighbours instead. Each incidence direction
-    has the same total. Repeated directions share their weight.
+    has the same mean. Repeated directions share their weight.
     """
-    incidence = _labels(np.stack([theta_i, np.where(theta_i > 0, phi_i, 0.0)]))
+    polar = incidence_labels(theta_i)
+    azimuth = angle_labels(np.where(theta_i > _SAME_ANGLE, phi_i, 0.0))
+    incidence = polar * (azimuth.max(initial=0) + 1) + azimuth
     weights = np.empty(theta_i.size)
-    for label in range(incidence.max(initial=-1) + 1):
+    for label in np.unique(incidence):
         rows = np.flatnonzero(incidence == label)
         own = _of_one_incidence(theta_r[rows], phi_r[rows] - phi_i[rows])
         weights[rows] = own / own.mean()
@@ -31,85 +36,134 @@ def solid_angles(theta_r: np.ndarray, delta: np.ndarray) -> np.ndarray | None:
     """Solid angle in sr of each row of one incidence; ``delta = phi_r - phi_i``.
 
     None where the directions are not on rings, so that no absolute figure is known. Rows
-    that lie on one side of the plane of incidence stand for both.
+    that lie on one side of the plane of incidence stand for both. Sparse rings, such as a
+    fine scan of the plane of incidence between full ones, lie inside what the full rings
+    stand for and get 0.
     """
-    ring = _labels(theta_r[None])
-    count = int(ring.max()) + 1
-    if count < 4 or theta_r.size < 3 * count:
+    ring = angle_labels(theta_r)
+    if not _on_rings(ring):
         return None
-    return _of_rings(theta_r, delta, ring)
+    sparse = _sparse_rings(theta_r, delta, ring)[ring]
+    out = np.zeros(theta_r.size)
+    full = np.flatnonzero(~sparse)
+    if np.unique(ring[full]).size < 4:
+        return None
+    again = angle_labels(theta_r[full])
+    out[full] = _zones(theta_r[full], again)[again] * _widths(delta, ring)[full]
+    return out
 
 
 def incidence_labels(theta_i: np.ndarray) -> np.ndarray:
-    """A running number per distinct polar angle of incidence, ascending."""
-    return _labels(theta_i[None])
+    """A running number per polar angle of incidence, ascending.
+
+    More than 90 of them are scattered and are put together by degrees.
+    """
+    label = angle_labels(theta_i)
+    if label.max(initial=0) < _MANY:
+        return label
+    return np.unique(theta_i // _BIN, return_inverse=True)[1].reshape(-1)
 
 
-def _labels(columns: np.ndarray) -> np.ndarray:
-    rounded = np.round(columns / _SAME_ANGLE).astype(np.int64)
-    return np.unique(rounded, axis=1, return_inverse=True)[1].reshape(-1)
+def angle_labels(theta: np.ndarray) -> np.ndarray:
+    """A running number per distinct angle, ascending.
+
+    Angles belong together that follow each other by less than 1e-3 rad, which forgives
+    the jitter of an instrument.
+    """
+    order = np.argsort(theta, kind="stable")
+    label = np.empty(theta.size, dtype=np.int64)
+    new = np.diff(theta[order]) > _SAME_ANGLE
+    label[order] = np.concatenate([[0], np.cumsum(new)])[: theta.size]
+    return label
+
+
+def _on_rings(ring: np.ndarray) -> bool:
+    count = int(ring.max()) + 1
+    return count > 3 and ring.size >= 3 * count
 
 
 def _of_one_incidence(theta: np.ndarray, delta: np.ndarray) -> np.ndarray:
-    if theta.size == 1:
-        return np.ones(1)
-    ring = _labels(theta[None])
-    count = ring.max() + 1
-    if count > 3 and theta.size < 3 * count:
+    ring = angle_labels(theta)
+    if ring.max() > 2 and not _on_rings(ring):
         return _of_scattered(theta, delta)
-    return _of_rings(theta, delta, ring)
+    sparse = _sparse_rings(theta, delta, ring)
+    zones, widths = _zones(theta, ring), _widths(delta, ring)
+    if sparse.any() and not sparse.all():
+        # Full rings keep the zone between full rings; a sparse ring's rows are as wide
+        # as a usual row.
+        full = np.flatnonzero(~sparse[ring])
+        zones[~sparse] = _zones(theta[full], angle_labels(theta[full]))
+        arc = np.median(widths[full] * np.sin(theta[full]))
+        rows = np.flatnonzero(sparse[ring])
+        widths[rows] = arc / np.maximum(np.sin(theta[rows]), 1e-3)
+    return zones[ring] * widths
 
 
-def _of_rings(theta: np.ndarray, delta: np.ndarray, ring: np.ndarray) -> np.ndarray:
-    """Zone of each ring times the azimuth that each of its rows stands for."""
-    side = np.sin(delta)
-    one_sided = bool(np.all(side > -_SAME_ANGLE) or np.all(side < _SAME_ANGLE))
-    count = int(ring.max()) + 1
+def _zones(theta: np.ndarray, ring: np.ndarray) -> np.ndarray:
+    """Difference of the cosines of the mid-angles around each ring."""
     level = np.bincount(ring, theta) / np.bincount(ring)
+    if level.size == 1:
+        return np.ones(1)
     middle = 0.5 * (level[1:] + level[:-1])
-    first = 1.5 * level[0] - 0.5 * level[1] if count > 1 else 0.0
-    last = 1.5 * level[-1] - 0.5 * level[-2] if count > 1 else 0.5 * np.pi
+    first = 1.5 * level[0] - 0.5 * level[1]
+    last = 1.5 * level[-1] - 0.5 * level[-2]
     if level[-1] < 0.5 * np.pi:
         last = min(last, 0.5 * np.pi)
     lower = np.concatenate([[max(first, 0.0)], middle])
     upper = np.concatenate([middle, [last]])
-    zone = np.abs(np.cos(lower) - np.cos(upper)) + 1e-12
-    out = np.empty(theta.size)
-    for k in range(count):
+    return np.abs(np.cos(lower) - np.cos(upper)) + 1e-12
+
+
+def _sparse_rings(theta: np.ndarray, delta: np.ndarray, ring: np.ndarray) -> np.ndarray:
+    """Rings whose rows are much farther apart than those of the usual ring."""
+    level = np.bincount(ring, theta) / np.bincount(ring)
+    arc = np.empty(level.size)
+    for k in range(level.size):
+        angle = np.sort(np.mod(delta[ring == k], 2 * np.pi))
+        gaps = np.diff(angle)
+        gaps = gaps[gaps > _SAME_ANGLE]
+        arc[k] = (gaps.min() if gaps.size else np.pi) * np.sin(level[k])
+    return arc > _SPARSE * np.median(arc) + _SAME_ANGLE
+
+
+def _widths(delta: np.ndarray, ring: np.ndarray) -> np.ndarray:
+    """Width in azimuth of every row, rad."""
+    side = np.sin(delta)
+    one_sided = bool(np.all(side > -_SAME_ANGLE) or np.all(side < _SAME_ANGLE))
+    out = np.empty(delta.size)
+    for k in range(int(ring.max()) + 1):
         rows = np.flatnonzero(ring == k)
-        out[rows] = zone[k] * _azimuth_widths(delta[rows], one_sided)
+        out[rows] = _azimuth_widths(delta[rows], one_sided)
     return out
 
 
 def _azimuth_widths(delta: np.ndarray, one_sided: bool) -> np.ndarray:
     """Width in azimuth between the mid-points to the neighbours on a ring, rad.
 
-    A gap wider than twice the usual one is not bridged: what was not measured stands for
-    nothing. Repeated directions share their width.
+    A gap more than twice as wide as the usual one and as both of its neighbours is not
+    bridged: what was not measured stands for nothing. Repeated directions share their
+    width.
     """
     angle = np.mod(delta, 2 * np.pi)
     if one_sided:
         angle = np.abs(np.arctan2(np.sin(delta), np.cos(delta)))
-    distinct, which, count = np.unique(
-        np.round(angle / _SAME_ANGLE).astype(np.int64),
-        return_inverse=True,
-        return_counts=True,
-    )
-    angle = distinct * _SAME_ANGLE
+    group = angle_labels(angle)
+    count = np.bincount(group)
+    angle = np.bincount(group, angle) / count
     if angle.size == 1:
         return np.full(delta.size, 2 * np.pi / delta.size)
     inner = np.diff(angle)
-    reach = np.median(inner)
     if one_sided:
         # The mirror images of the first and the last row are their neighbours.
-        before, after = 2 * angle[:1], 2 * (np.pi - angle[-1:])
-        gaps = np.minimum(np.concatenate([before, inner, after]), 2.0 * reach)
-        width = gaps[:-1] + gaps[1:]
+        gaps = np.concatenate([2 * angle[:1], inner, 2 * (np.pi - angle[-1:])])
+        around = np.concatenate([inner[:1], gaps, inner[-1:]])
     else:
-        around = np.concatenate([inner, angle[:1] + 2 * np.pi - angle[-1:]])
-        gaps = np.minimum(around, 2.0 * reach)
-        width = 0.5 * (gaps + np.roll(gaps, 1))
-    return (width / count)[which.reshape(-1)] + 1e-12
+        gaps = np.concatenate([inner, angle[:1] + 2 * np.pi - angle[-1:]])
+        around = np.concatenate([gaps[-1:], gaps, gaps[:1]])
+    beside = np.maximum(around[:-2], around[2:])
+    gaps = np.minimum(gaps, 2.0 * np.maximum(beside, np.median(inner)))
+    width = gaps[:-1] + gaps[1:] if one_sided else 0.5 * (gaps + np.roll(gaps, 1))
+    return (width / count)[group] + 1e-12
 
 
 def _of_scattered(theta: np.ndarray, delta: np.ndarray) -> np.ndarray:

@@ -23,6 +23,8 @@ from fitting.reduced import Blocks, Problem
 MAX_STEPS = 200
 _MAX_SHAPE_STEP = 1.5
 _FIRST_DAMPING = 1e-3
+_NOTICEABLE = 1e-10
+_MAX_IDLE = 8
 
 
 class Solution(NamedTuple):
@@ -42,6 +44,7 @@ class _State(NamedTuple):
     damping: Array
     growth: Array
     predicted: Array
+    idle: Array
     started: Array
     done: Array
 
@@ -51,7 +54,8 @@ class ArrowLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
 
     Damping is scaled by the diagonal (Marquardt) and updated by Nielsen's rule (Madsen,
     Nielsen and Tingleff 2004, eq. 2.21). Stops when the decrease that the quadratic model
-    still promises is below ``rtol`` of the cost or ``atol``.
+    still promises is below ``rtol`` of the cost or ``atol``, or when eight accepted steps
+    in a row gained less than 1e-10 of the cost.
     """
 
     rtol: float = 1e-13
@@ -63,7 +67,8 @@ class ArrowLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         zero = jnp.zeros((), dtype=jnp.float64)
         blocks = jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), f_struct)
         no = jnp.asarray(False)
-        return _State(blocks, y, zero + _FIRST_DAMPING, zero + 2.0, zero + jnp.inf, no, no)
+        start = (zero + _FIRST_DAMPING, zero + 2.0, zero + jnp.inf)
+        return _State(blocks, y, *start, idle=jnp.asarray(0), started=no, done=no)
 
     def step(self, fn, y, args, options, state, tags):
         del options, tags
@@ -85,8 +90,14 @@ class ArrowLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         proposal, predicted = propose(problem, at, blocks, damping)
         small = predicted <= self.rtol * blocks.cost + self.atol * problem.scale
         stuck = damping > 1e12
-        done = (state.started | accept) & (small | stuck)
-        state = _State(blocks, at, damping, growth, predicted, state.started | accept, done)
+        # On a flat valley the model keeps promising what rounding then eats.
+        gained = state.accepted.cost - new.cost > _NOTICEABLE * new.cost
+        idle = jnp.where(accept & state.started & ~gained, state.idle + 1, state.idle)
+        idle = jnp.where(accept & gained, 0, idle)
+        done = (state.started | accept) & (small | stuck | (idle >= _MAX_IDLE))
+        state = _State(
+            blocks, at, damping, growth, predicted, idle, state.started | accept, done
+        )
         return proposal, state, aux
 
     def terminate(self, fn, y, args, options, state, tags):

@@ -68,6 +68,7 @@ class _Errors:
     coefficient_at_bound: np.ndarray
     coefficient_freedom: np.ndarray
     correlation: np.ndarray
+    values: np.ndarray
 
 
 def _errors(f: Found, cov: Covariance) -> _Errors:
@@ -109,6 +110,14 @@ def _errors(f: Found, cov: Covariance) -> _Errors:
     per_channel = np.clip(per_channel, -1.0, 1.0)
     per_channel[bad[:, :, None] | bad[:, None, :]] = np.nan
     freedom = np.asarray(cov.freedom)
+    weight = np.asarray(f.problem.weight)
+    values = np.broadcast_to(np.count_nonzero(weight, axis=1), c)
+    # No variance means no influence on the data, and with fewer values than unknowns
+    # nothing is left over to judge errors by: neither is certainty.
+    sd_u, sd_x = np.where(sd_u > 0, sd_u, np.nan), np.where(sd_x > 0, sd_x, np.nan)
+    sd_x[values <= m] = np.nan
+    if values.sum() <= c * m + k:
+        sd_u, sd_x = np.full_like(sd_u, np.nan), np.full_like(sd_x, np.nan)
     return _Errors(
         shape=np.where(shape_at, np.nan, sd_u),
         shape_at_bound=shape_at,
@@ -117,6 +126,7 @@ def _errors(f: Found, cov: Covariance) -> _Errors:
         coefficient_at_bound=at,
         coefficient_freedom=freedom[: c * m].reshape(c, m),
         correlation=per_channel,
+        values=values,
     )
 
 
@@ -175,7 +185,26 @@ def parameters(
     correlations = Correlations(
         names, [[[finite_or_none(v) for v in row] for row in block] for block in blocks]
     )
-    return table, correlations, _identifiability(table, names, blocks, channels)
+    words = _missing_values(errors, len(free_shape), len(free_linear), channels)
+    return table, correlations, words + _identifiability(table, names, blocks, channels)
+
+
+def _missing_values(
+    errors: list[_Errors], n_shape: int, n_linear: int, channels: list[str]
+) -> list[str]:
+    values = np.concatenate([e.values for e in errors])
+    out = [
+        f"{channels[c]} has no valid value: its parameters mean nothing"
+        for c in np.flatnonzero(values == 0)
+    ]
+    for e in errors:
+        unknowns = e.values.size * n_linear + n_shape
+        if 0 < e.values.sum() <= unknowns:
+            out.append(
+                f"{int(e.values.sum())} values for {unknowns} free parameters: nothing is "
+                "left over to judge the errors by"
+            )
+    return out
 
 
 def _intervals(
@@ -224,9 +253,15 @@ def _identifiability(
         pairs = list(zip(p.value, p.standard_uncertainty, strict=True))
         loose = sum(s is not None and s > abs(v) for v, s in pairs)
         bound = sum(p.at_bound)
+        unknown = sum(s is None for s in p.standard_uncertainty) - bound
         of = f" in {{}} of {len(pairs)} channels" if len(pairs) > 1 else ""
         if bound:
             out.append(f"{p.name} is at a bound{of.format(bound)}")
+        if unknown > 0:
+            out.append(
+                f"{p.name} has no uncertainty{of.format(unknown)}: the data do not "
+                "determine it at all"
+            )
         if loose:
             out.append(
                 f"{p.name} is not determined{of.format(loose)}: its standard uncertainty "

@@ -4,17 +4,18 @@ The covariance is the sandwich ``A^-1 B A^-1`` of the estimating equations (Whit
 Econometrica 48, 817; Liang and Zeger 1986): ``A`` the Gauss-Newton matrix, ``B`` the sum of
 the outer products of every row's own gradient, all channels of a row together. It asks
 neither that the noise be the same everywhere nor that the channels of one row err
-independently; residuals are inflated by their leverage, ``r / (1 - h)`` (HC3, MacKinnon
-and White 1985), since the few rows on a peak pull the fit towards themselves.
+independently; residuals are inflated by their leverage, ``r / sqrt(1 - h)`` (HC2,
+MacKinnon and White 1985), since the few rows on a peak pull the fit towards themselves.
 
 A variance that rests on few rows is itself uncertain. With the influence ``z_n`` of row n,
 of variance ``v_n``, the sum ``sum z_n^2`` has ``(sum v)^2 / sum v^2`` degrees of freedom
-(Satterthwaite 1946, Biometrics Bulletin 2, 110), estimated for Gaussian errors, where
-``E z^4 = 3 v^2``, by ``3 (sum z^2)^2 / sum z^4 - 2``.
+(Satterthwaite 1946, Biometrics Bulletin 2, 110; Bell and McCaffrey 2002, Survey
+Methodology 28, 169). ``v`` comes from relative and absolute noise fitted to the residuals.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from typing import NamedTuple
 
 import equinox as eqx
@@ -24,11 +25,12 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Array, Float
 
-from fitting import reduced
+from fitting import qp, reduced
 from fitting.reduced import Problem
 from fitting.solve import Solution
 
 _ON_BOUND = 1e-9
+_NOISE_STEPS = 4
 
 
 class Covariance(NamedTuple):
@@ -44,8 +46,13 @@ class Covariance(NamedTuple):
 
 
 def covariance(problem: Problem, end: Solution) -> Covariance:
-    """Sandwich covariance at a minimum; coefficients on a bound count as known."""
-    b = jax.device_get(end.blocks)
+    """Sandwich covariance at a minimum; coefficients on a bound count as known.
+
+    Penalties move the minimum but are no data: the information is that of the data alone.
+    """
+    u, x = jnp.asarray(end.u), jnp.asarray(end.x)
+    blocks = _data_blocks(problem, u, x) if problem.penalised else end.blocks
+    b = jax.device_get(blocks)
     c, m, k = b.h_xu.shape
     active, inverse = _on_free_directions(problem, np.asarray(end.x), b.h_xx)
     response = inverse @ b.h_xu
@@ -56,13 +63,53 @@ def covariance(problem: Problem, end: Solution) -> Covariance:
     for i in range(c):
         own = slice(i * m, (i + 1) * m)
         bread[own, own] += inverse[i]
-    u, x = jnp.asarray(end.u), jnp.asarray(end.x)
-    moments = _moments(problem, u, x, jnp.asarray(bread))
-    matrix, fourth = (np.asarray(v) for v in moments)
+    noise = jnp.asarray([1.0, 1.0])
+    for _ in range(_NOISE_STEPS):
+        noise = _fitted_noise(problem, u, x, noise)
+    matrix, first, second = (
+        np.asarray(v) for v in _moments(problem, u, x, jnp.asarray(bread), noise)
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
-        quotient = np.diag(matrix) ** 2 / fourth
-    freedom = np.where(fourth > 0, np.maximum(3.0 * quotient - 2.0, 1.0), np.inf)
+        freedom = np.where(second > 0, np.maximum(first**2 / second, 1.0), np.inf)
     return Covariance(matrix, freedom, active)
+
+
+@eqx.filter_jit
+def _data_blocks(
+    problem: Problem, u: Float[Array, " k"], x: Float[Array, "c m"]
+) -> reduced.Blocks:
+    # The energy weight, not the flag: without penalty rows a quadratic problem would move
+    # its coefficients to their own best values.
+    zero = jnp.zeros_like(problem.energy_weight)
+    plain = dataclasses.replace(problem, energy_weight=zero, reciprocity_weight=zero)
+    return reduced.evaluate(plain, u, x, jnp.asarray(False))
+
+
+@eqx.filter_jit
+def _fitted_noise(
+    problem: Problem,
+    u: Float[Array, " k"],
+    x: Float[Array, "c m"],
+    noise: Float[Array, " t"],
+) -> Float[Array, " t"]:
+    """Relative and absolute noise variance: ``r^2 ~ noise[0] (d f)^2 + noise[1] d^2``.
+
+    One step of iteratively weighted least squares; the weights come from ``noise``.
+    """
+
+    def sums(f: Array, r: Array, d: Array, *_: Array) -> tuple[Array, ...]:
+        relative, absolute = (d * f) ** 2, d**2
+        expected = noise[0] * relative + noise[1] * absolute
+        weight = jnp.where(
+            expected > 0, 1.0 / jnp.where(expected > 0, expected, 1.0) ** 2, 0.0
+        )
+        design = jnp.stack([relative, absolute]).reshape(2, -1)
+        weighted = design * weight.ravel()
+        return weighted @ design.T, weighted @ (r**2).ravel()
+
+    matrix, right = reduced.sum_over_rows(problem, u, x, sums)
+    limits = jnp.zeros((1, 2), dtype=right.dtype)
+    return qp.solve(matrix[None], right[None], jnp.eye(2), limits).x[0]
 
 
 @eqx.filter_jit
@@ -71,27 +118,38 @@ def _moments(
     u: Float[Array, " k"],
     x: Float[Array, "c m"],
     bread: Float[Array, "q q"],
+    noise: Float[Array, " t"],
 ) -> tuple[Array, ...]:
-    """Sums over rows of the outer product and the fourth power of their influence."""
+    """Sums over rows of the outer product of their influence, and of ``v`` and ``v^2``."""
     c, m, k = *x.shape, u.shape[0]
     channels = jnp.arange(c)
     by_channel = bread[: c * m, : c * m].reshape(c, m, c, m)[channels, :, channels]
     cross = bread[: c * m, c * m :].reshape(c, m, k)
     shared = bread[c * m :, c * m :]
+    to_x = jnp.moveaxis(bread[:, : c * m].reshape(c * m + k, c, m), 1, 0)
+    to_u = bread[:, c * m :]
 
-    def moments(r: Array, d: Array, columns_x: Array, columns_u: Array):
+    def moments(f: Array, r: Array, d: Array, columns_x: Array, columns_u: Array):
         ex, eu = d[:, None] * columns_x, d[:, None] * columns_u
         leverage = (
             jnp.einsum("cmn,cmp,cpn->cn", ex, by_channel, ex)
             + 2.0 * jnp.einsum("cmn,cmk,ckn->cn", ex, cross, eu)
             + jnp.einsum("ckn,kl,cln->cn", eu, shared, eu)
         )
-        inflated = (r / (1.0 - jnp.clip(leverage, 0.0, 0.999)))[:, None]
+        inflated = (r / jnp.sqrt(1.0 - jnp.clip(leverage, 0.0, 0.999)))[:, None]
         scores = jnp.concatenate(
-            [(ex * inflated).reshape(c * m, -1), jnp.sum(eu * inflated, axis=0)]
+            [(ex * inflated).reshape(c * m, r.shape[1]), jnp.sum(eu * inflated, axis=0)]
         )
         influence = bread @ scores
-        return influence @ influence.T, jnp.sum(influence**4, axis=1)
+        expected = noise[0] * (d * f) ** 2 + noise[1] * d**2
+
+        def add(total: Array, channel: tuple[Array, ...]) -> tuple[Array, None]:
+            own, own_x, own_u, variance = channel
+            return total + (own @ own_x + to_u @ own_u) ** 2 * variance, None
+
+        start = jnp.zeros_like(influence)
+        v, _ = jax.lax.scan(add, start, (to_x, ex, eu, expected))
+        return influence @ influence.T, jnp.sum(v, axis=1), jnp.sum(v**2, axis=1)
 
     return reduced.sum_over_rows(problem, u, x, moments)
 

@@ -38,6 +38,12 @@ def make_unknowns(model: Model, n_channels: int, options: FitOptions) -> Unknown
     }
     for name, value in fixed.items():
         _check_fixed(name, value, declared[name], n_channels)
+        if name in ties:
+            raise ModelError(f"{name} is both fixed and tied; leave one of them out")
+    for name in options.bounds:
+        if name in fixed or name in ties:
+            how = "fixed" if name in fixed else "tied"
+            raise ModelError(f"{name} is {how} and cannot have bounds as well")
     free = [n for n in declared if n not in fixed and n not in ties]
     shape_free = [n for n in free if not declared[n].coefficient]
     linear_free = [n for n in free if declared[n].coefficient]
@@ -58,7 +64,7 @@ def make_unknowns(model: Model, n_channels: int, options: FitOptions) -> Unknown
                 f"{name} cannot be tied to {master}: both must be shape parameters, or "
                 "both coefficients, and a tied parameter cannot be tied to"
             )
-    supports = [_support(n, declared[n], bounds.get(n)) for n in shape_free]
+    supports = [_support(n, declared, bounds.get(n), ties) for n in shape_free]
     linear_source = tuple(source(n, linear_free) for n in linear_names)
     constant = np.zeros((len(linear_names), n_channels))
     for i, name in enumerate(linear_names):
@@ -98,8 +104,10 @@ def _parse_tie(name: str, text: str, declared: dict[str, Parameter]) -> tuple[st
         factor = float(match["factor"] or 1.0) if match else math.nan
     except ValueError:
         factor = math.nan
-    if match is None or not math.isfinite(factor):
-        raise ModelError(f"tie of {name}: {text!r} is not 'other' or 'factor*other'")
+    if match is None or not math.isfinite(factor) or factor <= 0:
+        raise ModelError(
+            f"tie of {name}: {text!r} is not 'other' or 'factor*other', factor above 0"
+        )
     (master,) = _matching(match["name"], declared)
     if master == name:
         raise ModelError(f"{name} is tied to itself")
@@ -107,7 +115,10 @@ def _parse_tie(name: str, text: str, declared: dict[str, Parameter]) -> tuple[st
 
 
 def _check_fixed(name: str, value: Value, parameter: Parameter, n_channels: int) -> None:
-    values = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    try:
+        values = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    except (TypeError, ValueError):
+        values = np.array([math.nan])
     sizes = (1, n_channels) if parameter.coefficient else (1,)
     if values.size not in sizes or not np.all(np.isfinite(values)):
         raise ModelError(
@@ -116,21 +127,36 @@ def _check_fixed(name: str, value: Value, parameter: Parameter, n_channels: int)
         )
     low, high = parameter.support
     outside = (values < low) | (values > high)
-    if not parameter.coefficient and parameter.scale != "periodic" and outside.any():
+    if parameter.scale != "periodic" and outside.any():
         raise ModelError(f"{name} is fixed at {value}, outside [{low:g}, {high:g}]")
 
 
 def _support(
-    name: str, parameter: Parameter, bound: tuple[float, float] | None
+    name: str,
+    declared: dict[str, Parameter],
+    bound: tuple[float, float] | None,
+    ties: dict[str, tuple[str, float]],
 ) -> tuple[float, float]:
-    narrowed = parameter.bounded(*bound) if bound else parameter
-    low, high = narrowed.support
+    """Support within the bounds, where also all that is tied to it stays in its own."""
+    parameter = declared[name]
+    low, high = (parameter.bounded(*bound) if bound else parameter).support
+    for other, (master, factor) in ties.items():
+        if master == name and parameter.scale != "periodic":
+            ends = declared[other].support
+            low, high = max(low, ends[0] / factor), min(high, ends[1] / factor)
     if not low < high:
         raise ModelError(
-            f"bounds {bound} of {name} leave nothing of its support "
+            f"bounds {bound} and ties of {name} leave nothing of its support "
             f"[{parameter.support[0]:g}, {parameter.support[1]:g}]; to hold it, fix it"
         )
     return low, high
+
+
+def _ends(bound: tuple[float, float] | None, parameter: Parameter) -> tuple[float, float]:
+    """Bounds of a coefficient; an infinite end stands for that of the support."""
+    low, high = bound or parameter.support
+    low = low if math.isfinite(low) else parameter.support[0]
+    return low, high if math.isfinite(high) else parameter.support[1]
 
 
 def _constraints(
@@ -148,7 +174,7 @@ def _constraints(
     limits: list[np.ndarray] = []
     ones = np.ones(constant.shape[1])
     for k, name in enumerate(free):
-        low, high = bounds.get(name, declared[name].support)
+        low, high = _ends(bounds.get(name), declared[name])
         if not low < high:
             raise ModelError(f"bounds ({low:g}, {high:g}) of {name}: expected low < high")
         unit = np.zeros(len(free))
@@ -171,13 +197,22 @@ def _constraints(
             own = [i for i, n in enumerate(names) if n.rpartition(".")[0] == label]
             groups.append(own)
         for choice in itertools.product(*groups):
-            row, limit = np.zeros(len(free)), -ones
+            row, limit, least = np.zeros(len(free)), -ones, 0.0 * ones
             for i in choice:
                 index, factor = source[i]
                 if index >= 0:
                     row[index] -= factor
+                    low = _ends(bounds.get(free[index]), declared[free[index]])[0]
+                    least = least + factor * max(low, 0.0)
                 else:
                     limit = limit + constant[i]
+                    least = least + constant[i]
+            if np.any(least > 1.0 + 1e-12):
+                raise ModelError(
+                    f"energy 'hard' cannot hold: {' + '.join(names[i] for i in choice)} is "
+                    f"at least {least.max():g} by what is fixed or bounded; it must be "
+                    "able to stay below 1"
+                )
             if row.any():
                 rows.append(row)
                 limits.append(limit)

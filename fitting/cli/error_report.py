@@ -86,13 +86,13 @@ def channels(out: Console, found: Sequence[ChannelError], everything: bool = Fal
     shown = shown_channels(len(found), everything)
     for c in shown:
         e = found[c]
-        rows.add_row(e.channel, number(e.rms, 3), percent(e.relative_rms))
+        share = e.relative_rms
+        rows.add_row(e.channel, number(e.rms, 3), "-" if share is None else percent(share))
     out.print(rows)
     if len(shown) < len(found):
-        worst = max(found, key=lambda e: e.relative_rms)
+        share, worst = max((e.relative_rms or 0.0, e.channel) for e in found)
         out.print(
-            f"{len(shown)} of {len(found)} channels; worst {worst.channel} with "
-            f"{percent(worst.relative_rms)}",
+            f"{len(shown)} of {len(found)} channels; worst {worst} with {percent(share)}",
             style="dim",
         )
 
