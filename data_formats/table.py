@@ -79,7 +79,11 @@ def to_measurement(
     if missing := int(np.count_nonzero(~valid)):
         value = np.where(valid, value, np.nan)
         notes.append(
-            Note("not-finite-masked", f"{missing} values are not finite; masked", missing)
+            Note(
+                "not-finite-masked",
+                f"values that are not finite: {missing}; masked",
+                missing,
+            )
         )
     if columns.valid:
         valid &= numbers[:, columns.valid] == 1
@@ -249,11 +253,15 @@ def describe(measurement: Measurement) -> Measurement:
     negative = int(np.count_nonzero(measurement.valid & (measurement.value < 0)))
     if negative:
         notes.append(
-            Note("negative-values", f"{negative} values are negative; kept", negative)
+            Note("negative-values", f"negative values: {negative}; kept", negative)
         )
     if twice := _duplicates(measurement):
         notes.append(
-            Note("duplicate-directions", f"{twice} rows repeat a pair of directions", twice)
+            Note(
+                "duplicate-directions",
+                f"rows that repeat a pair of directions: {twice}",
+                twice,
+            )
         )
     symmetry = detect_symmetry(measurement)
     if symmetry == "bilateral":

@@ -116,7 +116,7 @@ class Problem(eqx.Module):
 
 
 class Blocks(NamedTuple):
-    """Value, gradient and Gauss-Newton matrix of half the sum of squares at a point."""
+    """Sum of squares ``r.r`` at a point, with ``J.r`` (half its gradient) and ``J.J``."""
 
     x: Float[Array, "c m"]
     cost: Float[Array, ""]
