@@ -35,7 +35,7 @@ from fitting.result import (
     Settings,
     Solver,
 )
-from fitting.search import again, robust_width, search
+from fitting.search import again, predicted_by, robust_width, search
 from fitting.summary import Found, joined_values
 from fitting.uncertainty import covariance
 from fitting.validation import cross_validation
@@ -94,32 +94,32 @@ def _fit(
     if objective == "chi2" and (rows.sigma is None or options.noise is not None):
         # Weights from noisy values favour the low ones; weights from the fit do not.
         for _ in range(_NOISE_ROUNDS):
-            rows = with_noise_of(rows, _predicted(model, found, rows))
+            rows = with_noise_of(rows, predicted_by(found, rows))
             found = again(rows, model, options, found)
     width = math.inf
     if options.robust:
         say("again with robust residuals")
-        width = robust_width(rows, model, objective, options, found)
+        width = robust_width(rows, objective, options, found)
         found = again(rows, model, options, found, robust_width=width)
-    energy_active = False
     wants_energy = options.energy != "hard" and float(options.energy) > 0
     one_sided = not all(lobe.RECIPROCAL for lobe in model.lobes) and options.reciprocity > 0
-    exceeds = wants_energy and _worst_albedo(model, found)[0] > 1.0
+    worst = _worst_albedo(model, found)
+    exceeds = wants_energy and worst[0] > 1.0
     if exceeds or one_sided:
         say("again with the penalties")
         found = again(rows, model, options, found, robust_width=width, penalised=True)
-        energy_active = exceeds
+        worst = _worst_albedo(model, found)
     say("uncertainties")
     covariances = [covariance(f.problem, f.solution) for f in found]
     values = joined_values(found)
-    predicted = _predicted(model, found, rows)
+    predicted = predicted_by(found, rows)
     validation = None
     if cross_validate:
         say("leaving out each angle of incidence")
         validation = cross_validation(rows, model, objective, options, found, width)
     parameters, correlations, words = summary.parameters(model, found, covariances, names)
-    albedo, theta, worst_channel = _worst_albedo(model, found)
-    if energy_active:
+    albedo, theta, worst_channel = worst
+    if exceeds:
         words.append(
             "the energy penalty holds the fit: without it the albedo would exceed 1; the "
             "uncertainties are those of the data alone"
@@ -147,7 +147,7 @@ def _fit(
             constraint="hard" if options.energy == "hard" else
             ("penalty" if wants_energy else "none"),
             weight=float(options.energy) if options.energy != "hard" else None,
-            active=energy_active,
+            active=exceeds,
         ),
         reciprocity=_reciprocity(model, values, options),
         colour=_colour(measurement, rows, predicted) if colour else None,
@@ -156,11 +156,6 @@ def _fit(
         versions=_versions(),
         references=sorted({lobe.REFERENCE for lobe in model.lobes}),
     )  # fmt: skip
-
-
-def _predicted(model: Model, found: list[Found], rows: Rows) -> np.ndarray:
-    predicted = predict_geometry(model, joined_values(found), rows.geometry)
-    return np.broadcast_to(predicted, rows.value.shape)
 
 
 def _worst_albedo(model: Model, found: list[Found]) -> tuple[float, float, int]:

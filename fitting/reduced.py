@@ -51,6 +51,17 @@ class Unknowns(eqx.Module):
     limits: Float[Array, "c p"]
 
     @property
+    def free_shape(self) -> list[str]:
+        """The parameter that each shape unknown is, by name."""
+        return _masters(self.shape_names, self.shape_source, self.n_shape)
+
+    @property
+    def free_coefficients(self) -> list[str]:
+        """The parameter that each free coefficient is, by name."""
+        names, source = self.coefficient_names, self.coefficient_source
+        return _masters(names, source, self.n_coefficients)
+
+    @property
     def n_shape(self) -> int:
         """Number of free shape unknowns."""
         return len(self.scales)
@@ -76,6 +87,16 @@ class Unknowns(eqx.Module):
                 zip(self.coefficient_names, self.coefficient_source, strict=True)
             )
         }
+
+
+def _masters(
+    names: tuple[str, ...], source: tuple[tuple[int, float], ...], count: int
+) -> list[str]:
+    out = [""] * count
+    for name, (index, factor) in zip(names, source, strict=True):
+        if index >= 0 and factor == 1.0 and not out[index]:
+            out[index] = name
+    return out
 
 
 class Problem(eqx.Module):
@@ -265,19 +286,15 @@ def _penalty_rows(problem: Problem, u: Array):
 
     def energy(v: Array) -> tuple[Array, ...]:
         shape = unknowns.shape(v)
-        return tuple(
-            jnp.concatenate(
-                [
-                    albedo.albedo_basis(
-                        lobe, model.of_lobe(i, shape), cosines,
-                        nodes=ENERGY_NODES, azimuth=azimuth,
-                    )[j]
-                    for azimuth in azimuths
-                ]
-            )
-            for i, lobe in enumerate(model.lobes)
-            for j in range(model.n_basis(i))
-        )  # fmt: skip
+        out: list[Array] = []
+        for i, lobe in enumerate(model.lobes):
+            own = model.of_lobe(i, shape)
+            there = [
+                albedo.albedo_basis(lobe, own, cosines, nodes=ENERGY_NODES, azimuth=azimuth)
+                for azimuth in azimuths
+            ]
+            out += [jnp.concatenate(parts) for parts in zip(*there, strict=True)]
+        return tuple(out)
 
     def hinge(total: Array) -> tuple[Array, Array]:
         w = jnp.sqrt(problem.energy_weight / total.shape[1])

@@ -80,11 +80,17 @@ def again(
     return out
 
 
+def predicted_by(found: list[Found], rows: Rows) -> np.ndarray:
+    """Values ``(n, c)`` of the fit at the rows, 1/sr."""
+    model = found[0].problem.model
+    values = predict_geometry(model, joined_values(found), rows.geometry)
+    return np.broadcast_to(values, rows.value.shape)
+
+
 def robust_width(
-    rows: Rows, model: Model, objective: str, options: FitOptions, found: list[Found]
+    rows: Rows, objective: str, options: FitOptions, found: list[Found]
 ) -> float:
     """Width of the pseudo-Huber residual: 1.345 robust standard deviations of a fit's."""
-    predicted = predict_geometry(model, joined_values(found), rows.geometry)
-    r = judge.residuals(rows, predicted, objective, options)[rows.valid]
+    r = judge.residuals(rows, predicted_by(found, rows), objective, options)[rows.valid]
     spread = _MAD_TO_SIGMA * float(np.median(np.abs(r - np.median(r))))
     return _HUBER * spread if spread > 0 else math.inf

@@ -37,10 +37,9 @@ def candidates(problem: Problem) -> np.ndarray:
     if k == 1:
         share = (np.arange(count)[:, None] + 0.5) / count
     declared = problem.model.parameters()
-    free_names = _free_names(problem)
     lower, upper = np.asarray(unknowns.lower), np.asarray(unknowns.upper)
     points = np.empty((count, k))
-    for j, name in enumerate(free_names):
+    for j, name in enumerate(unknowns.free_shape):
         parameter = declared[name]
         low, high = (float(np.clip(s, lower[j], upper[j])) for s in parameter.start)
         if not low < high:
@@ -53,25 +52,14 @@ def candidates(problem: Problem) -> np.ndarray:
             to_real_line(parameter.scale, v, float(lower[j]), float(upper[j]))
             for v in value
         ]
-    for group in _equal_lobes(problem, free_names):
+    for group in _equal_lobes(unknowns.free_shape):
         order = np.argsort(points[:, group[0]], axis=1)
         for columns in group:
             points[:, columns] = np.take_along_axis(points[:, columns], order, axis=1)
     return points
 
 
-def _free_names(problem: Problem) -> list[str]:
-    unknowns = problem.unknowns
-    names = [""] * unknowns.n_shape
-    for name, (index, factor) in zip(
-        unknowns.shape_names, unknowns.shape_source, strict=True
-    ):
-        if index >= 0 and factor == 1.0 and not names[index]:
-            names[index] = name
-    return names
-
-
-def _equal_lobes(problem: Problem, names: list[str]) -> list[list[list[int]]]:
+def _equal_lobes(names: list[str]) -> list[list[list[int]]]:
     """Per family of equal lobes: for every parameter, its columns in lobe order."""
     families: dict[str, dict[str, list[int]]] = {}
     for j, name in enumerate(names):

@@ -142,10 +142,7 @@ def parameters(
     sources |= dict(
         zip(unknowns.coefficient_names, unknowns.coefficient_source, strict=True)
     )
-    free_shape = _masters(unknowns.shape_names, unknowns.shape_source, unknowns.n_shape)
-    free_linear = _masters(
-        unknowns.coefficient_names, unknowns.coefficient_source, unknowns.n_coefficients
-    )
+    free_shape, free_linear = unknowns.free_shape, unknowns.free_coefficients
     for name, declared in model.parameters().items():
         index, factor = sources[name]
         low, high = declared.support
@@ -217,16 +214,6 @@ def _intervals(
         (float(v - h), float(v + h)) if np.isfinite(h) else None
         for v, h in zip(value, half, strict=True)
     ]
-
-
-def _masters(
-    names: tuple[str, ...], source: tuple[tuple[int, float], ...], count: int
-) -> list[str]:
-    out = [""] * count
-    for name, (index, factor) in zip(names, source, strict=True):
-        if index >= 0 and factor == 1.0 and not out[index]:
-            out[index] = name
-    return out
 
 
 def _identifiability(

@@ -12,12 +12,11 @@ import numpy as np
 from fitting import judge
 from fitting.model import Model
 from fitting.options import FitOptions
-from fitting.predict import predict_geometry
 from fitting.problem import Rows
 from fitting.result import AngleError, CrossValidation
-from fitting.search import problems
+from fitting.search import predicted_by, problems
 from fitting.solve import refine
-from fitting.summary import Found, joined_values
+from fitting.summary import Found
 
 
 def cross_validation(
@@ -41,8 +40,7 @@ def cross_validation(
         for p, f in zip(problems(rows, model, options, **kwargs), found, strict=True):
             u, x = jnp.asarray(f.solution.u), jnp.asarray(f.solution.x)
             ends.append(Found(p, jax.device_get(refine(p, u, x)), ()))
-        predicted = predict_geometry(model, joined_values(ends), rows.geometry)
-        predicted = np.broadcast_to(predicted, rows.value.shape)
+        predicted = predicted_by(ends, rows)
         r = judge.residuals(rows, predicted, objective, options)
         errors.append(judge.angle_error(rows, r, predicted, theta, held))
         total += float(np.sum(r[held] ** 2))
