@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from fitting.cli.failures import UsageError
-from fitting.cli.flags import Flags
+from fitting.cli.flags import Flags, Reader
 
 if TYPE_CHECKING:
     from data_formats import Measurement
@@ -32,10 +32,7 @@ def convert(
     format: Annotated[
         str | None, Parameter(help="Format of the source, if it is not recognised.")
     ] = None,
-    reader: Annotated[
-        list[str] | None,
-        Parameter(negative="", help="OPTION=VALUE for the format's reader. Repeatable."),
-    ] = None,
+    reader: Reader = None,
     flags: Flags | None = None,
 ) -> int:
     """Write a file of measured reflectance in another format."""

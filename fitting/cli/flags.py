@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Group, Parameter
 
 _GROUP = Group("Output", sort_key=90)
+
+# What every command that reads a file takes.
+File = Annotated[Path, Parameter(help="A file of measured reflectance.")]
+Format = Annotated[
+    str | None, Parameter(help="Format of the file, if it is not recognised.")
+]
+Reader = Annotated[
+    list[str] | None,
+    Parameter(negative="", help="OPTION=VALUE for the format's reader. Repeatable."),
+]
+Json = Annotated[
+    bool,
+    Parameter(negative="", show_default=False, help="Everything as JSON, for programs."),
+]
 
 
 @Parameter(name="*")

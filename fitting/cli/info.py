@@ -4,34 +4,21 @@ from __future__ import annotations
 
 import json as json_module
 import sys
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import Parameter
-
-from fitting.cli.flags import Flags
+from fitting.cli.flags import File, Flags, Format, Json, Reader
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
 def info(
-    file: Annotated[Path, Parameter(help="A file of measured reflectance.")],
+    file: File,
     /,
     *,
-    json: Annotated[
-        bool,
-        Parameter(
-            negative="", show_default=False, help="Everything as JSON, for programs."
-        ),
-    ] = False,
-    format: Annotated[
-        str | None, Parameter(help="Format of the file, if it is not recognised.")
-    ] = None,
-    reader: Annotated[
-        list[str] | None,
-        Parameter(negative="", help="OPTION=VALUE for the format's reader. Repeatable."),
-    ] = None,
+    json: Json = False,
+    format: Format = None,
+    reader: Reader = None,
     flags: Flags | None = None,
 ) -> int:
     """Say what is in a file: geometry, coverage, values, quality."""

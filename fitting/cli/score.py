@@ -9,27 +9,17 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from fitting.cli.flags import Flags
+from fitting.cli.flags import File, Flags, Format, Json, Reader
 
 
 def score(
-    file: Annotated[Path, Parameter(help="A file of measured reflectance.")],
+    file: File,
     result: Annotated[Path, Parameter(help="A result of `brdf fit`, NAME.fit.json.")],
     /,
     *,
-    json: Annotated[
-        bool,
-        Parameter(
-            negative="", show_default=False, help="Everything as JSON, for programs."
-        ),
-    ] = False,
-    format: Annotated[
-        str | None, Parameter(help="Format of the file, if it is not recognised.")
-    ] = None,
-    reader: Annotated[
-        list[str] | None,
-        Parameter(negative="", help="OPTION=VALUE for the format's reader. Repeatable."),
-    ] = None,
+    json: Json = False,
+    format: Format = None,
+    reader: Reader = None,
     flags: Flags | None = None,
 ) -> int:
     """Measure a fit result against a file, without fitting."""
