@@ -132,7 +132,7 @@ class Problem(eqx.Module):
             objectives.OBJECTIVES[self.objective].linear
             and not self.robust
             and not self.penalised
-            and all(lobe.LINEAR for lobe in self.model.lobes)
+            and all(lobe.linear for lobe in self.model.lobes)
         )
 
 

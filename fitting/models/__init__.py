@@ -5,9 +5,9 @@ from __future__ import annotations
 import importlib
 from importlib.metadata import entry_points
 
-from fitting.models.lobe import Lobe, Shape, SlopeWidths
+from fitting.models.lobe import AxisPeak, Lobe, Peak, Shape, SlopeWidths
 
-__all__ = ["LOBES", "Lobe", "Shape", "SlopeWidths", "lobe_class"]
+__all__ = ["LOBES", "AxisPeak", "Lobe", "Peak", "Shape", "SlopeWidths", "lobe_class"]
 
 LOBES: dict[str, str] = {
     "lambert": "Lambert",

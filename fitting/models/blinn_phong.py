@@ -52,6 +52,6 @@ class BlinnPhong(Lobe):
     ) -> tuple[Array, ...]:
         return coefficients
 
-    def slope_widths(self, shape: Shape) -> SlopeWidths:
+    def peak(self, shape: Shape) -> SlopeWidths:
         alpha = jnp.sqrt(2.0 / (shape["exponent"] + 2.0))
         return SlopeWidths(alpha, alpha, jnp.zeros_like(alpha))

@@ -74,7 +74,7 @@ class EON(Lobe):
         beyond = slope * jnp.maximum(rho - 1.0, 0.0)
         return rho, inside**2 * (1.0 - lost) / (1.0 - inside * lost) + beyond
 
-    def slope_widths(self, shape: Shape) -> None:
+    def peak(self, shape: Shape) -> None:
         return None
 
 

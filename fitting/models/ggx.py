@@ -49,5 +49,5 @@ class GGX(Lobe):
     ) -> tuple[Array, ...]:
         return coefficients
 
-    def slope_widths(self, shape: Shape) -> SlopeWidths:
+    def peak(self, shape: Shape) -> SlopeWidths:
         return microfacet.slope_widths(shape)

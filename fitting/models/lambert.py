@@ -32,5 +32,5 @@ class Lambert(Lobe):
     ) -> tuple[Array, ...]:
         return coefficients
 
-    def slope_widths(self, shape: Shape) -> None:
+    def peak(self, shape: Shape) -> None:
         return None

@@ -16,11 +16,25 @@ Shape = Mapping[str, Float[Array, ""]]
 
 
 class SlopeWidths(NamedTuple):
-    """Where a lobe that peaks around the half vector is wide, in slope space."""
+    """A peak where the half vector is the normal, and how wide it is in slope space."""
 
     alpha_x: Float[Array, ""]
     alpha_y: Float[Array, ""]
     angle: Float[Array, ""]
+
+
+class AxisPeak(NamedTuple):
+    """A peak along ``(c_xy wo_x, c_xy wo_y, c_z wo_z)``, like ``cos^exponent`` around it.
+
+    ``c_xy = -1, c_z = 1`` is the mirror direction, ``c_xy = c_z = 1`` the way back.
+    """
+
+    c_xy: Float[Array, ""]
+    c_z: Float[Array, ""]
+    exponent: Float[Array, ""]
+
+
+Peak = SlopeWidths | AxisPeak | None
 
 
 class Lobe(eqx.Module):
@@ -33,9 +47,11 @@ class Lobe(eqx.Module):
     - ``REFERENCE``: the paper, to the equation number.
     - ``RECIPROCAL``: whether ``f(wi, wo) = f(wo, wi)`` for all parameters.
     - ``LINEAR``: whether the amplitudes are the coefficients themselves, so that the best
-      coefficients of a quadratic objective follow from the shape in closed form.
+      coefficients of a quadratic objective follow from the shape in closed form; an
+      option may make them nonlinear, which `linear` tells.
     - ``ALBEDO_BOUND``: an upper bound of the directional albedo with the largest
       coefficient at 1, or None where there is none.
+    - ``NONNEGATIVE``: whether no basis function is ever below zero.
     """
 
     NAME: ClassVar[str]
@@ -43,6 +59,12 @@ class Lobe(eqx.Module):
     RECIPROCAL: ClassVar[bool]
     LINEAR: ClassVar[bool]
     ALBEDO_BOUND: ClassVar[float | None]
+    NONNEGATIVE: ClassVar[bool] = True
+
+    @property
+    def linear(self) -> bool:
+        """`LINEAR`, with the options that this lobe has."""
+        return self.LINEAR
 
     @abc.abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
@@ -63,5 +85,5 @@ class Lobe(eqx.Module):
         """One factor per basis function, from the coefficients (each ``(c,)``)."""
 
     @abc.abstractmethod
-    def slope_widths(self, shape: Shape) -> SlopeWidths | None:
-        """Widths for the half-vector quadrature, or None for a broad, smooth lobe."""
+    def peak(self, shape: Shape) -> Peak:
+        """Where the albedo's quadrature needs its nodes; None for a broad, smooth lobe."""

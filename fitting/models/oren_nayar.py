@@ -52,5 +52,5 @@ class OrenNayar(Lobe):
     ) -> tuple[Array, ...]:
         return coefficients
 
-    def slope_widths(self, shape: Shape) -> None:
+    def peak(self, shape: Shape) -> None:
         return None

@@ -54,5 +54,5 @@ class Ward(Lobe):
     ) -> tuple[Array, ...]:
         return coefficients
 
-    def slope_widths(self, shape: Shape) -> SlopeWidths:
+    def peak(self, shape: Shape) -> SlopeWidths:
         return microfacet.slope_widths(shape)

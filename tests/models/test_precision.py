@@ -14,7 +14,6 @@ import math
 import zlib
 
 import cases
-import formulas
 import jax
 import jax.numpy as jnp
 import mpmath as mp
@@ -23,6 +22,11 @@ import pytest
 from cases import CASES, Case
 
 from fitting.geometry import Geometry, from_angles
+from fitting.oracle import formula
+from fitting.oracle.angles import INPUTS, Angles, angles
+from fitting.oracle.facets import slope2
+
+mp.mp.dps = 50
 
 precisions = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 
@@ -53,11 +57,11 @@ def condition(function, inputs: dict[str, mp.mpf], index: int) -> mp.mpf:
     return total
 
 
-def underflows(case: Case, shape: dict, angles: formulas.Angles, tiny: float) -> bool:
+def underflows(case: Case, shape: dict, at: Angles, tiny: float) -> bool:
     """Whether a Gaussian skirt is so low that the code sets it to zero."""
     if case.name not in ("beckmann", "ward"):
         return False
-    return formulas.slope2(shape, angles.theta_h, angles.phi_h) > -0.85 * math.log(tiny)
+    return slope2(shape, at.theta_h, at.phi_h) > -0.85 * math.log(tiny)
 
 
 def worst_errors(case: Case, dtype, count: int) -> tuple[float, float, float]:
@@ -74,17 +78,17 @@ def worst_errors(case: Case, dtype, count: int) -> tuple[float, float, float]:
         basis = jax.jit(lambda s, g: jnp.stack(case.lobe.basis(s, g)))
         got = np.asarray(basis(on_device, geometry))
     assert got.dtype == dtype
-    stored = {n: np.asarray(getattr(geometry, n)) for n in formulas.INPUTS}
-    reference = formulas.formula(case.name, dict(case.options))
+    stored = {n: np.asarray(getattr(geometry, n)) for n in INPUTS}
+    reference = formula(case.lobe)
 
     def of_inputs(values):
-        return reference(values, formulas.angles(values))
+        return reference(values, angles(values), dict(case.options))
 
     tiny = float(np.finfo(dtype).tiny)
     tame = largest = per_condition = 0.0
     for i in range(count):
         inputs = {n: mp.mpf(float(v[i])) for n, v in {**stored, **shapes}.items()}
-        if underflows(case, inputs, formulas.angles(inputs), tiny):
+        if underflows(case, inputs, angles(inputs), tiny):
             continue
         for j, exact in enumerate(of_inputs(inputs)):
             if abs(exact) < 1e6 * tiny:

@@ -1,0 +1,36 @@
+"""What the lobes are held against: the formulas of their papers, in 50 digits.
+
+Written from the papers with angles, tangents and no care for rounding, and never from the
+stable forms of `fitting.models`: two ways to one number. Each function takes the shape
+parameters ``s`` by name, the angles ``t`` of a pair of directions (`Angles`) and the
+options ``o`` of the lobe by field, and returns the basis functions as a tuple.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Callable
+
+from fitting.models import Lobe
+
+FORMULAS: dict[str, str] = {
+    "lambert": "diffuse",
+    "oren_nayar": "diffuse",
+    "eon": "diffuse",
+    "ggx": "facets",
+    "beckmann": "facets",
+    "ward": "facets",
+    "blinn_phong": "facets",
+}
+
+
+def formula(lobe: Lobe) -> Callable | None:
+    """``f(s, t, o)`` of a lobe, or None where there is none.
+
+    A lobe from outside brings its own as a function ``oracle`` in its file.
+    """
+    if lobe.NAME in FORMULAS:
+        module = importlib.import_module(f"fitting.oracle.{FORMULAS[lobe.NAME]}")
+        return getattr(module, lobe.NAME)
+    return getattr(inspect.getmodule(type(lobe)), "oracle", None)
