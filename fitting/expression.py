@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Container
 from dataclasses import dataclass
 
 OPTIONS: dict[str, tuple[str, object]] = {
@@ -12,6 +13,12 @@ OPTIONS: dict[str, tuple[str, object]] = {
     "schlick": ("fresnel", "schlick"),
     "dielectric": ("fresnel", "dielectric"),
 }
+
+
+def options_of(fields: Container[str]) -> list[str]:
+    """The words for the options that a lobe with these fields has."""
+    return [o for o, (field, _) in OPTIONS.items() if field in fields]
+
 
 _TERM = re.compile(
     r"\s*(?:(?P<count>\d+)\s*\*\s*)?(?P<name>[a-z][a-z0-9_]*)\s*"

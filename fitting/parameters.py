@@ -22,7 +22,8 @@ class Parameter:
 
     A *coefficient* multiplies a basis function, is linear, and has one value per channel.
     A *shape* parameter enters nonlinearly and is shared by all channels unless asked
-    otherwise. ``support`` is the closed interval of meaningful values; ``start`` the
+    otherwise. A *given* one is a shape parameter that is known, one value per channel, and
+    never fitted. ``support`` is the closed interval of meaningful values; ``start`` the
     interval from which starting values are taken. ``scale`` tells how a shape parameter
     is spread over its support: ``log``, ``linear``, or ``periodic`` (then ``support`` is
     one period and there is no bound).
@@ -34,6 +35,7 @@ class Parameter:
     unit: str
     meaning: str
     coefficient: bool = False
+    given: bool = False
     scale: Scale = "linear"
     start: tuple[float, float] = (math.nan, math.nan)
 
@@ -73,6 +75,13 @@ def coefficient(
 ) -> Parameter:
     """Declare a coefficient: linear, one value per channel."""
     return Parameter(name, default, support, unit, meaning, coefficient=True)
+
+
+def given(
+    name: str, default: float, support: tuple[float, float], meaning: str, *, unit: str
+) -> Parameter:
+    """Declare a quantity that is known of every channel, such as its wavelength."""
+    return Parameter(name, default, support, unit, meaning, given=True, start=support)
 
 
 def to_value(scale: Scale, u: AnyArray, lower: AnyArray, upper: AnyArray) -> AnyArray:

@@ -62,7 +62,7 @@ def _list(out: Console) -> None:
 def _describe(out: Console, name: str) -> None:
     from fitting.cli.assignments import nearest
     from fitting.cli.terminal import bullet, heading
-    from fitting.expression import OPTIONS
+    from fitting.expression import OPTIONS, options_of
     from fitting.models import lobe_class
 
     if name not in _names():
@@ -73,8 +73,7 @@ def _describe(out: Console, name: str) -> None:
     out.print(inspect.cleandoc(lobe.__doc__ or "").replace("``", ""))
     out.print(heading("Parameters"))
     _parameters(out, lobe)
-    fields = set(lobe.__dataclass_fields__)
-    options = [o for o, (field, _) in OPTIONS.items() if field in fields]
+    options = options_of(lobe.__dataclass_fields__)
     if options:
         out.print(heading("Options"))
         for option in options:
