@@ -4,24 +4,37 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Container
 from dataclasses import dataclass
+from typing import Any
 
 OPTIONS: dict[str, tuple[str, object]] = {
     "iso": ("anisotropic", False),
     "aniso": ("anisotropic", True),
     "schlick": ("fresnel", "schlick"),
     "dielectric": ("fresnel", "dielectric"),
+    "conductor": ("fresnel", "conductor"),
+    "f82": ("fresnel", "f82"),
+    "generalised": ("fresnel", "generalised"),
+    "correlated": ("shadowing", "correlated"),
+    "uncorrelated": ("shadowing", "uncorrelated"),
+    "v_cavity": ("shadowing", "v_cavity"),
+    "bare": ("shadowing", "bare"),
+    "ms": ("multiple_scattering", True),
+    "spectral": ("spectral", True),
+    "retro": ("retro", True),
 }
 
 
-def options_of(fields: Container[str]) -> list[str]:
-    """The words for the options that a lobe with these fields has."""
-    return [o for o, (field, _) in OPTIONS.items() if field in fields]
+def options_of(lobe: Any) -> list[str]:
+    """The words for the options that a class of lobes has."""
+    fields = lobe.__dataclass_fields__
+    return [
+        o for o, (f, _) in OPTIONS.items() if f in fields or (f == "retro" and lobe.RETRO)
+    ]
 
 
 _TERM = re.compile(
-    r"\s*(?:(?P<count>\d+)\s*\*\s*)?(?P<name>[a-z][a-z0-9_]*)\s*"
+    r"\s*(?:(?P<count>\d+)\s*\*\s*)?(?P<name>[a-z][a-z0-9_]*|[^()+*]*\.py)\s*"
     r"(?:\((?P<options>[^()]*)\))?\s*"
 )
 
@@ -32,7 +45,7 @@ class ModelError(ValueError):
 
 @dataclass(frozen=True)
 class Term:
-    """One lobe of an expression with the options written behind it."""
+    """One lobe of an expression, by name or by its file, with the options behind it."""
 
     lobe: str
     options: tuple[str, ...]
@@ -55,7 +68,7 @@ def parse(expression: str, known: tuple[str, ...]) -> tuple[Term, ...]:
                 "write for instance 'lambert + ggx' or 'lambert + 2*ggx(aniso)'"
             )
         name = match["name"]
-        if name not in known:
+        if name not in known and not name.endswith(".py"):
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known)}"
             raise ModelError(f"model {expression!r}: there is no lobe {name!r}; {hint}")
@@ -86,9 +99,8 @@ def canonical(terms: tuple[Term, ...]) -> str:
     return " + ".join(parts)
 
 
-def lobe_labels(terms: tuple[Term, ...]) -> tuple[str, ...]:
+def lobe_labels(names: tuple[str, ...]) -> tuple[str, ...]:
     """A name for each lobe: ``ggx`` if it is alone, else ``ggx1, ggx2`` in order."""
-    names = [t.lobe for t in terms]
     seen: dict[str, int] = {}
     labels: list[str] = []
     for name in names:

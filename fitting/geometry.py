@@ -7,15 +7,29 @@ Half vectors are formed here in float64 and stored, because ``sin^2(theta_h)`` t
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 from numpy.typing import ArrayLike
 
 Vector = Float[Array, " n"]
+
+
+class PolarAngles(eqx.Module):
+    """The few polar angles that a goniometer's many rows are made of.
+
+    ``index_i, index_o (n,)`` tell which of the ``(m,)`` angles each row has.
+    """
+
+    sine2: Float[Array, " m"]
+    cosine: Float[Array, " m"]
+    index_i: Int[Array, " n"]
+    index_o: Int[Array, " n"]
 
 
 class Geometry(eqx.Module):
@@ -36,6 +50,29 @@ class Geometry(eqx.Module):
     hy: Vector
     hz: Vector
     cos_d: Vector
+    polar: PolarAngles | None = None
+
+    def over_angles(self, function: Callable[[Array, Array], Array]) -> tuple[Array, Array]:
+        """``function(sin^2(theta), cos(theta))`` at the source's and detector's angles.
+
+        For costly functions of one polar angle: where the angles that occur are known,
+        they are evaluated once each.
+        """
+        if self.polar is None:
+            return (
+                function(self.wix**2 + self.wiy**2, self.cos_i),
+                function(self.wox**2 + self.woy**2, self.cos_o),
+            )
+        values = function(self.polar.sine2, self.polar.cosine)
+        return values[self.polar.index_i], values[self.polar.index_o]
+
+    @property
+    def turned(self) -> Geometry:
+        """The same detectors with the source turned by 180 degrees around the normal."""
+        turned = from_components(
+            -self.wix, -self.wiy, self.cos_i, self.wox, self.woy, self.cos_o
+        )
+        return dataclasses.replace(turned, polar=self.polar)
 
     @property
     def swapped(self) -> Geometry:

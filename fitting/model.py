@@ -10,8 +10,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike
 
 from fitting import expression as expr
-from fitting.geometry import Geometry
+from fitting.geometry import Geometry, from_angles
 from fitting.models import LOBES, Lobe, lobe_class
+from fitting.models.retro import Retro
 from fitting.parameters import Parameter
 
 Parameters = Mapping[str, ArrayLike]
@@ -34,7 +35,10 @@ class Model(eqx.Module):
     def __init__(self, expression: str):
         terms = expr.parse(expression, _known_lobes())
         self.lobes = tuple(_make_lobe(t) for t in terms)
-        self.labels = expr.lobe_labels(terms)
+        own = zip(terms, self.lobes, strict=True)
+        self.labels = expr.lobe_labels(
+            tuple(lobe.NAME if t.lobe.endswith(".py") else t.lobe for t, lobe in own)
+        )
         self.expression = expr.canonical(terms)
 
     def parameters(self) -> dict[str, Parameter]:
@@ -58,8 +62,8 @@ class Model(eqx.Module):
         """Number of basis functions of one lobe."""
         lobe = self.lobes[index]
         shape = {p.name: 0.5 for p in lobe.parameters() if not p.coefficient}
-        geometry = Geometry(*[jnp.ones(1)] * len(Geometry.__dataclass_fields__))
-        return len(jax.eval_shape(lobe.basis, shape, geometry))
+        normal = from_angles([0.0], 0.0, [0.0], 0.0)
+        return len(jax.eval_shape(lobe.basis, shape, normal))
 
     def of_lobe(self, index: int, values: Mapping[str, Array]) -> dict[str, Array]:
         """The values of one lobe under their short names."""
@@ -130,10 +134,12 @@ def _known_lobes() -> tuple[str, ...]:
 
 def _make_lobe(term: expr.Term) -> Lobe:
     cls = lobe_class(term.lobe)
-    options = dict(expr.OPTIONS[o] for o in term.options)
-    fields = set(cls.__dataclass_fields__)
+    known = expr.options_of(cls)
     for option in term.options:
-        field = expr.OPTIONS[option][0]
-        if field not in fields:
-            raise expr.ModelError(f"lobe {term.lobe!r} has no option {option!r}")
-    return cls(**options)
+        if option not in known:
+            has = f"; it has {', '.join(known)}" if known else ", nor any other"
+            raise expr.ModelError(f"lobe {term.lobe!r} has no option {option!r}{has}")
+    options = dict(expr.OPTIONS[o] for o in term.options)
+    retro = options.pop("retro", False)
+    lobe = cls(**options)
+    return Retro(lobe) if retro else lobe

@@ -190,7 +190,7 @@ def _constraints(
         # sum over lobes of any one coefficient each stays below 1.
         groups: list[list[int]] = []
         for label, lobe in zip(model.labels, model.lobes, strict=True):
-            if lobe.ALBEDO_BOUND is None:
+            if lobe.albedo_bound is None:
                 raise ModelError(
                     f"energy 'hard' needs lobes of bounded albedo; {label} has no bound"
                 )

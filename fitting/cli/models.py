@@ -73,7 +73,7 @@ def _describe(out: Console, name: str) -> None:
     out.print(inspect.cleandoc(lobe.__doc__ or "").replace("``", ""))
     out.print(heading("Parameters"))
     _parameters(out, lobe)
-    options = options_of(lobe.__dataclass_fields__)
+    options = options_of(lobe)
     if options:
         out.print(heading("Options"))
         for option in options:

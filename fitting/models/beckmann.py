@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array
 
 from fitting.geometry import Geometry
@@ -13,13 +12,16 @@ from fitting.models import fresnel, microfacet, ndf, shadowing
 from fitting.models.lobe import Lobe, Shape, SlopeWidths
 from fitting.parameters import Parameter
 
+_FACETS = microfacet.Facets(ndf.beckmann, shadowing.cos_lambda_beckmann)
+
 
 class Beckmann(Lobe):
     """``f = D(h) F(cos_d) G2 / (4 cos_i cos_o)`` with the Beckmann distribution.
 
     Walter et al. 2007, eq. 20 and 25, with the exact Smith shadowing of a Gaussian surface
     (eq. 26), height-correlated (Heitz 2014, eq. 99). The skirt falls off far faster than
-    that of GGX. Single scattering: the white albedo falls to 0.46 at alpha = 1.
+    that of GGX. Single scattering: the white albedo falls to 0.46 at alpha = 1; the option
+    ``ms`` adds the rest.
     """
 
     NAME: ClassVar[str] = "beckmann"
@@ -27,9 +29,20 @@ class Beckmann(Lobe):
     RECIPROCAL: ClassVar[bool] = True
     LINEAR: ClassVar[bool] = True
     ALBEDO_BOUND: ClassVar[float | None] = 1.0
+    RETRO: ClassVar[bool] = True
+    PER_ANGLE: ClassVar[bool] = True
 
     anisotropic: bool = eqx.field(static=True, default=False)
     fresnel: fresnel.Fresnel = eqx.field(static=True, default="schlick")
+    shadowing: shadowing.Shadowing = eqx.field(static=True, default="correlated")
+    multiple_scattering: bool = eqx.field(static=True, default=False)
+
+    def __check_init__(self) -> None:
+        microfacet.check(self.anisotropic, self)
+
+    @property
+    def linear(self) -> bool:
+        return microfacet.linear(self)
 
     def parameters(self) -> tuple[Parameter, ...]:
         return microfacet.width_parameters(self.anisotropic) + fresnel.parameters(
@@ -37,18 +50,12 @@ class Beckmann(Lobe):
         )
 
     def basis(self, shape: Shape, geometry: Geometry) -> tuple[Array, ...]:
-        g = geometry
-        up = g.reflects
-        s = microfacet.stretched(shape, g)
-        d = ndf.beckmann(s.h2, g.hz, s.area)
-        cos_i, cos_o = jnp.where(up, g.cos_i, 1.0), jnp.where(up, g.cos_o, 1.0)
-        v = shadowing.beckmann_visibility(s.i2, s.o2, cos_i, cos_o)
-        return fresnel.split(self.fresnel, shape, jnp.where(up, d * v, 0.0), g.cos_d)
+        return microfacet.basis(self, _FACETS, shape, geometry)
 
     def amplitudes(
         self, shape: Shape, coefficients: tuple[Array, ...]
     ) -> tuple[Array, ...]:
-        return coefficients
+        return microfacet.amplitudes(self, _FACETS, shape, coefficients)
 
     def peak(self, shape: Shape) -> SlopeWidths:
         return microfacet.slope_widths(shape)

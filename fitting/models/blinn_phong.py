@@ -27,8 +27,13 @@ class BlinnPhong(Lobe):
     RECIPROCAL: ClassVar[bool] = True
     LINEAR: ClassVar[bool] = True
     ALBEDO_BOUND: ClassVar[float | None] = 1.0
+    RETRO: ClassVar[bool] = True
 
     fresnel: fresnel.Fresnel = eqx.field(static=True, default="schlick")
+
+    @property
+    def linear(self) -> bool:
+        return fresnel.linear(self.fresnel)
 
     def parameters(self) -> tuple[Parameter, ...]:
         exponent = shape(
@@ -50,7 +55,7 @@ class BlinnPhong(Lobe):
     def amplitudes(
         self, shape: Shape, coefficients: tuple[Array, ...]
     ) -> tuple[Array, ...]:
-        return coefficients
+        return fresnel.amplitudes(self.fresnel, coefficients)
 
     def peak(self, shape: Shape) -> SlopeWidths:
         alpha = jnp.sqrt(2.0 / (shape["exponent"] + 2.0))

@@ -5,43 +5,122 @@ from __future__ import annotations
 from typing import Literal
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array
 
 from fitting.models.lobe import Shape
 from fitting.parameters import Parameter, coefficient, shape
 
-Fresnel = Literal["schlick", "dielectric"]
+Fresnel = Literal["schlick", "dielectric", "conductor", "f82", "generalised"]
+
+# Where the reflectance of a metal dips, acos(1/7) = 81.8 degrees, and what Kutz et al. 2021
+# subtract there, c (1 - c)^6, at its largest.
+_DIP = 1.0 / 7.0
+_DIP_SIZE = _DIP * (1.0 - _DIP) ** 6
+_DIP_Q = (1.0 - _DIP) ** 5
 
 
 def parameters(kind: Fresnel) -> tuple[Parameter, ...]:
-    """``f0, f90`` for Schlick; index ``eta`` and a ``scale`` for the exact dielectric."""
+    """Shape parameters and coefficients of a Fresnel term."""
+    ends = (
+        coefficient("f0", 0.04, "reflectance of a facet at normal incidence"),
+        coefficient("f90", 1.0, "reflectance of a facet at grazing incidence"),
+    )
+    scale = coefficient("scale", 1.0, "factor of the Fresnel reflectance")
     if kind == "schlick":
+        return ends
+    if kind == "f82":
         return (
-            coefficient("f0", 0.04, "reflectance of a facet at normal incidence"),
-            coefficient("f90", 1.0, "reflectance of a facet at grazing incidence"),
+            *ends,
+            coefficient(
+                "tint", 1.0, "share of Schlick's reflectance that is left at 81.8 degrees",
+                support=(0.0, 1.0),
+            ),
+        )  # fmt: skip
+    if kind == "generalised":
+        return (
+            shape("power", 5.0, (1.0, 10.0), "exponent of 1 - cos_d", start=(2.0, 8.0)),
+            *ends,
         )
+    if kind == "conductor":
+        return (
+            shape("eta", 1.0, (1e-3, 10.0), "index of refraction", start=(0.1, 3.0)),
+            shape(
+                "k", 4.0, (0.0, 100.0), "extinction coefficient", scale="linear",
+                start=(1.0, 8.0),
+            ),
+            scale,
+        )  # fmt: skip
     return (
         shape(
             "eta", 1.5, (1.01, 4.0), "index of refraction relative to the outside",
             scale="linear", start=(1.3, 2.0),
         ),
-        coefficient("scale", 1.0, "factor of the Fresnel reflectance"),
+        scale,
     )  # fmt: skip
 
 
 def split(kind: Fresnel, shape: Shape, value: Array, cos_d: Array) -> tuple[Array, ...]:
     """Basis functions of a facet lobe ``value`` (1/sr, without Fresnel).
 
-    Schlick 1994, eq. 15, with a free grazing value: ``F = f0 (1 - q) + f90 q``,
-    ``q = (1 - cos_d)^5``, linear in both.
+    - Schlick 1994, eq. 15, with a free grazing value: ``F = f0 (1 - q) + f90 q``,
+      ``q = (1 - cos_d)^5``, linear in both; ``generalised`` has a free exponent.
+    - ``f82`` (Kutz, Hasan and Edmondson 2021): Schlick less ``(1 - tint) F(1/7)
+      c (1 - c)^6 / (1/7 (6/7)^6)``, the dip of metals before grazing.
+    - ``dielectric``, ``conductor``: exact, times a scale.
     """
+    if kind == "dielectric":
+        return (value * dielectric(cos_d, shape["eta"]),)
+    if kind == "conductor":
+        return (value * conductor(cos_d, shape["eta"], shape["k"]),)
+    # At retro-reflection a rounded cos_d may exceed 1, and q would be negative.
+    p = jnp.maximum(1.0 - cos_d, 0.0)
+    if kind == "generalised":
+        some = p > 0
+        logarithm = shape["power"] * jnp.log(jnp.where(some, p, 1.0))
+        rest = jnp.where(some, -jnp.expm1(logarithm), 1.0)
+        return value * rest, value * jnp.where(some, jnp.exp(logarithm), 0.0)
+    # 1 - q written as a product keeps its digits at grazing, where q goes to 1.
+    rest = cos_d * (1.0 + p * (1.0 + p * (1.0 + p * (1.0 + p))))
     if kind == "schlick":
-        # 1 - q written as a product keeps its digits at grazing, where q goes to 1. At
-        # retro-reflection a rounded cos_d may exceed 1, and q would be negative.
-        p = jnp.maximum(1.0 - cos_d, 0.0)
-        rest = cos_d * (1.0 + p * (1.0 + p * (1.0 + p * (1.0 + p))))
         return value * rest, value * p**5
-    return (value * dielectric(cos_d, shape["eta"]),)
+    return value * rest, value * p**5, value * (cos_d * p**6 / _DIP_SIZE)
+
+
+def linear(kind: Fresnel) -> bool:
+    """Whether `amplitudes` are the coefficients themselves."""
+    return kind != "f82"
+
+
+def amplitudes(kind: Fresnel, coefficients: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Factors of the basis functions of `split`."""
+    if kind != "f82":
+        return coefficients
+    f0, f90, tint = coefficients
+    return f0, f90, -(1.0 - tint) * (f0 * (1.0 - _DIP_Q) + f90 * _DIP_Q)
+
+
+def average(kind: Fresnel, shape: Shape, coefficients: tuple[Array, ...]) -> Array:
+    """``2 int_0^1 F(c) c dc``, the reflectance of a facet lit from everywhere.
+
+    In closed form where there is one, else by 32 nodes (error below 1e-6 for an index of
+    1.2 and above, 1e-4 at 1.01).
+    """
+    if kind in ("dielectric", "conductor"):
+        nodes, weights = np.polynomial.legendre.leggauss(32)
+        eta = shape["eta"]
+        c = jnp.asarray(0.5 * (nodes + 1.0), eta.dtype)
+        w = jnp.asarray(weights, eta.dtype) * c
+        f = dielectric(c, eta) if kind == "dielectric" else conductor(c, eta, shape["k"])
+        return jnp.sum(w * f) * coefficients[0]
+    f0, f90, *_ = coefficients
+    if kind == "generalised":
+        p = shape["power"]
+        return f0 + (f90 - f0) * 2.0 / ((p + 1.0) * (p + 2.0))
+    mean = f0 + (f90 - f0) / 21.0
+    if kind == "f82":
+        mean = mean + amplitudes(kind, coefficients)[2] / (126.0 * _DIP_SIZE)
+    return mean
 
 
 def dielectric(cos_d: Array, eta: Array) -> Array:
@@ -62,3 +141,30 @@ def dielectric(cos_d: Array, eta: Array) -> Array:
     rs = less / both
     rp_rs = (cos_d * both - 1.0) / jnp.where(total, 1.0, cos_d * less + 1.0)
     return jnp.where(total, 1.0, 0.5 * rs * rs * (1.0 + rp_rs * rp_rs))
+
+
+def conductor(cos_d: Array, eta: Array, k: Array) -> Array:
+    """Unpolarised reflectance of a smooth interface to the index ``eta + i k``.
+
+    In real arithmetic, with ``s2 = 1 - c^2``, ``t = eta^2 - k^2 - s2`` and ``a + i b`` the
+    root of ``t + 2 i eta k`` (Born and Wolf, 14.2)::
+
+        1 - R_s = 4 a c / ((a + c)^2 + b^2)
+        1 - R_p / R_s = 4 a c s2 / ((a c + s2)^2 + (b c)^2)
+
+    Of ``a`` and ``b`` the larger comes from a root and the other from ``eta k``, so that
+    nothing cancels: what a good mirror absorbs keeps its digits.
+    """
+    s2 = jnp.maximum((1.0 - cos_d) * (1.0 + cos_d), 0.0)
+    t = (eta - k) * (eta + k) - s2
+    product = eta * k
+    m = jnp.sqrt(jnp.maximum(t * t + 4.0 * product * product, jnp.finfo(t.dtype).tiny))
+    larger = jnp.sqrt(0.5 * (m + jnp.abs(t)))
+    smaller = product / larger
+    a, b = jnp.where(t >= 0, larger, smaller), jnp.where(t >= 0, smaller, larger)
+    s_loss = 4.0 * a * cos_d / ((a + cos_d) ** 2 + b * b)
+    q = a * cos_d + s2
+    p_below = q * q + (b * cos_d) ** 2
+    some = p_below > 0
+    p_loss = jnp.where(some, 4.0 * a * cos_d * s2 / jnp.where(some, p_below, 1.0), 0.0)
+    return 1.0 - 0.5 * (s_loss + s_loss + p_loss * (1.0 - s_loss))

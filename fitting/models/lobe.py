@@ -52,6 +52,9 @@ class Lobe(eqx.Module):
     - ``ALBEDO_BOUND``: an upper bound of the directional albedo with the largest
       coefficient at 1, or None where there is none.
     - ``NONNEGATIVE``: whether no basis function is ever below zero.
+    - ``RETRO``: whether the option ``retro`` makes sense, which turns the peak around.
+    - ``PER_ANGLE``: whether it calls `Geometry.over_angles`, so that a table of the polar
+      angles that occur is worth its making.
     """
 
     NAME: ClassVar[str]
@@ -60,11 +63,18 @@ class Lobe(eqx.Module):
     LINEAR: ClassVar[bool]
     ALBEDO_BOUND: ClassVar[float | None]
     NONNEGATIVE: ClassVar[bool] = True
+    RETRO: ClassVar[bool] = False
+    PER_ANGLE: ClassVar[bool] = False
 
     @property
     def linear(self) -> bool:
         """`LINEAR`, with the options that this lobe has."""
         return self.LINEAR
+
+    @property
+    def albedo_bound(self) -> float | None:
+        """`ALBEDO_BOUND`, with the options that this lobe has."""
+        return self.ALBEDO_BOUND
 
     @abc.abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:

@@ -1,18 +1,42 @@
-"""What all lobes around the half vector share: widths, tangent frame, stretched slopes."""
+"""What all lobes around the half vector share: widths, tangent frame, options."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
 
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from fitting.expression import ModelError
 from fitting.geometry import Geometry
+from fitting.models import fresnel, multiple_scattering, shadowing
 from fitting.models.lobe import Shape, SlopeWidths
 from fitting.parameters import Parameter, shape
 
 ALPHA_SUPPORT = (1e-4, 1.5)
+
+
+class Facets(NamedTuple):
+    """A distribution of facets: ``density(h2, hz, area)`` and ``cos_lambda(t2, cosine)``.
+
+    Both of stretched lengths (see `Stretched`), ``t2`` being ``i2`` or ``o2``.
+    """
+
+    density: Callable[[Array, Array, Array], Array]
+    cos_lambda: Callable[[Array, Array], Array]
+
+
+class Options(Protocol):
+    """The options of a microfacet lobe, as its fields."""
+
+    @property
+    def fresnel(self) -> fresnel.Fresnel: ...
+    @property
+    def shadowing(self) -> shadowing.Shadowing: ...
+    @property
+    def multiple_scattering(self) -> bool: ...
 
 
 def width_parameters(anisotropic: bool) -> tuple[Parameter, ...]:
@@ -43,6 +67,63 @@ def slope_widths(parameters: Shape) -> SlopeWidths:
         alpha = parameters["alpha"]
         return SlopeWidths(alpha, alpha, jnp.zeros_like(alpha))
     return SlopeWidths(parameters["alpha_x"], parameters["alpha_y"], parameters["angle"])
+
+
+def check(anisotropic: bool, options: Options) -> None:
+    """Refuse options that do not go together, with `ModelError`."""
+    if not options.multiple_scattering:
+        return
+    if anisotropic:
+        raise ModelError("option 'ms' is for isotropic lobes: leave 'aniso' out")
+    if options.shadowing not in ("correlated", "uncorrelated"):
+        raise ModelError(f"option 'ms' needs Smith's shadowing, not {options.shadowing!r}")
+
+
+def basis(options: Options, facets: Facets, shape: Shape, g: Geometry) -> tuple[Array, ...]:
+    """``D(h) V F(cos_d)`` split by Fresnel's coefficients (Walter et al. 2007, eq. 20)."""
+    single = _single(options, facets, shape)
+    terms = fresnel.split(options.fresnel, shape, single(g), g.cos_d)
+    if not options.multiple_scattering:
+        return terms
+    lost = multiple_scattering.Lost(single, shape["alpha"])
+    return (*terms, lost.basis(g))
+
+
+def amplitudes(
+    options: Options, facets: Facets, shape: Shape, coefficients: tuple[Array, ...]
+) -> tuple[Array, ...]:
+    """Factors of the basis functions."""
+    direct = fresnel.amplitudes(options.fresnel, coefficients)
+    if not options.multiple_scattering:
+        return direct
+    lost = multiple_scattering.Lost(_single(options, facets, shape), shape["alpha"])
+    average = fresnel.average(options.fresnel, shape, coefficients)
+    return (*direct, lost.amplitude(average))
+
+
+def linear(options: Options) -> bool:
+    """Whether the amplitudes are the coefficients themselves."""
+    return fresnel.linear(options.fresnel) and not options.multiple_scattering
+
+
+def _single(options: Options, facets: Facets, shape: Shape) -> Callable[[Geometry], Array]:
+    """Single scattering of facets that reflect everything, ``D V``, 1/sr."""
+
+    def value(g: Geometry) -> Array:
+        up = g.reflects
+        s = stretched(shape, g)
+        d = facets.density(s.h2, g.hz, s.area)
+
+        def cos_lambda() -> tuple[Array, Array]:
+            if "alpha" not in shape:
+                return facets.cos_lambda(s.i2, g.cos_i), facets.cos_lambda(s.o2, g.cos_o)
+            a2 = shape["alpha"] ** 2
+            return g.over_angles(lambda sine2, c: facets.cos_lambda(sine2 * a2, c))
+
+        v = shadowing.visibility(options.shadowing, g, up, cos_lambda)
+        return jnp.where(up, d * v, 0.0)
+
+    return value
 
 
 class Stretched(NamedTuple):

@@ -31,9 +31,14 @@ class Ward(Lobe):
     RECIPROCAL: ClassVar[bool] = True
     LINEAR: ClassVar[bool] = True
     ALBEDO_BOUND: ClassVar[float | None] = 1.0
+    RETRO: ClassVar[bool] = True
 
     anisotropic: bool = eqx.field(static=True, default=False)
     fresnel: fresnel.Fresnel = eqx.field(static=True, default="schlick")
+
+    @property
+    def linear(self) -> bool:
+        return fresnel.linear(self.fresnel)
 
     def parameters(self) -> tuple[Parameter, ...]:
         return microfacet.width_parameters(self.anisotropic) + fresnel.parameters(
@@ -52,7 +57,7 @@ class Ward(Lobe):
     def amplitudes(
         self, shape: Shape, coefficients: tuple[Array, ...]
     ) -> tuple[Array, ...]:
-        return coefficients
+        return fresnel.amplitudes(self.fresnel, coefficients)
 
     def peak(self, shape: Shape) -> SlopeWidths:
         return microfacet.slope_widths(shape)

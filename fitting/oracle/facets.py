@@ -27,13 +27,22 @@ def _inverse_a(s, theta, phi):
     return mp.tan(theta) * mp.sqrt((ax * mp.cos(phi)) ** 2 + (ay * mp.sin(phi)) ** 2)
 
 
-def _microfacet(s, t, d, smith):
-    lambdas = [
-        smith(_inverse_a(s, theta, phi))
-        for theta, phi in ((t.theta_i, t.phi_i), (t.theta_o, t.phi_o))
-    ]
-    g2 = 1 / (1 + sum(lambdas))
-    return d * g2 / (4 * mp.cos(t.theta_i) * mp.cos(t.theta_o))
+def _microfacet(s, t, o, d, smith):
+    """Torrance and Sparrow's formula; ``smith`` is ``Lambda`` of ``alpha tan(theta)``."""
+    cos_i, cos_o = mp.cos(t.theta_i), mp.cos(t.theta_o)
+    kind = o["shadowing"]
+    if kind == "bare":
+        return fresnel.times(d / 4, s, t, o)
+    if kind == "v_cavity":
+        twice = 2 * mp.cos(t.theta_h) / mp.cos(t.theta_d)
+        g2 = min(mp.mpf(1), twice * cos_i, twice * cos_o)
+    else:
+        of_i = smith(_inverse_a(s, t.theta_i, t.phi_i))
+        of_o = smith(_inverse_a(s, t.theta_o, t.phi_o))
+        g2 = 1 / (1 + of_i + of_o)
+        if kind == "uncorrelated":
+            g2 = 1 / ((1 + of_i) * (1 + of_o))
+    return fresnel.times(d * g2 / (4 * cos_i * cos_o), s, t, o)
 
 
 def ggx(s, t, o):
@@ -42,8 +51,7 @@ def ggx(s, t, o):
     d = 1 / (
         mp.pi * ax * ay * mp.cos(t.theta_h) ** 4 * (1 + slope2(s, t.theta_h, t.phi_h)) ** 2
     )
-    value = _microfacet(s, t, d, lambda u: (mp.sqrt(1 + u**2) - 1) / 2)
-    return fresnel.times(value, s, t, o)
+    return _microfacet(s, t, o, d, lambda u: (mp.sqrt(1 + u**2) - 1) / 2)
 
 
 def _beckmann_d(s, t):
@@ -63,8 +71,61 @@ def beckmann(s, t, o):
             return mp.mpf(0)
         return (mp.exp(-(a**2)) / (a * mp.sqrt(mp.pi)) - mp.erfc(a)) / 2
 
-    value = _microfacet(s, t, _beckmann_d(s, t), smith)
-    return fresnel.times(value, s, t, o)
+    return _microfacet(s, t, o, _beckmann_d(s, t), smith)
+
+
+def student_t(s, t, o):
+    """Ribardiere et al. 2017; shadowing by the hypergeometric integral of the slopes."""
+    ax, ay, _ = _widths(s)
+    g = s["gamma"]
+    spread = 1 + slope2(s, t.theta_h, t.phi_h) / (g - 1)
+    d = 1 / (mp.pi * ax * ay * mp.cos(t.theta_h) ** 4 * spread**g)
+
+    def smith(u):
+        if u == 0:
+            return mp.mpf(0)
+        z = 1 / u
+        half = mp.mpf(1) / 2
+        inner = z / mp.sqrt(g - 1) * mp.hyp2f1(half, g - half, 3 * half, -(z**2) / (g - 1))
+        first = (g - 1) ** (3 * half) * (1 + z**2 / (g - 1)) ** (3 * half - g)
+        ratio = mp.gamma(g - half) / (mp.gamma(g) * mp.sqrt(mp.pi))
+        return ratio * (first / (z * (2 * g - 3)) + (g - 1) * inner) - half
+
+    return _microfacet(s, t, o, d, smith)
+
+
+def gtr(s, t, o):
+    """Burley 2012, appendix B; shadowing by the area of the facets that face away."""
+    a, g = s["alpha"], s["gamma"]
+    if a == 1:
+        factor = 1 / mp.pi
+    elif g == 1:
+        factor = (a**2 - 1) / (mp.pi * mp.log(a**2))
+    else:
+        factor = (g - 1) * (a**2 - 1) / (mp.pi * (1 - (a**2) ** (1 - g)))
+
+    def density(cosine):
+        return factor / (1 + (a**2 - 1) * cosine**2) ** g
+
+    def smith(u):
+        """By 15 digits of quadrature over the slope ``e^x`` of the facets."""
+        if u == 0:
+            return mp.mpf(0)
+        first = a / u
+
+        def facing_away(x):
+            r = mp.e**x
+            turn = min(first / r, mp.mpf(1))
+            height = r * mp.sqrt(1 - turn**2) - first * mp.acos(turn)
+            cosine = 1 / mp.sqrt(1 + r**2)
+            return density(cosine) * cosine**4 * 2 * height * r * r
+
+        with mp.workdps(15):
+            low = mp.log(first)
+            bends = sorted({low, *(b for b in (mp.log(a), mp.mpf(0)) if b > low)})
+            return mp.quad(facing_away, [*bends, bends[-1] + 20]) / first
+
+    return _microfacet(s, t, o, density(mp.cos(t.theta_h)), smith)
 
 
 def ward(s, t, o):
