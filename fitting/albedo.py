@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
@@ -69,6 +70,15 @@ def model_albedo(
     """
     values = {n: jnp.asarray(v) for n, v in parameters.items()}
     known = model.parameters()
+    if any(v.ndim and not known[n].coefficient for n, v in values.items()):
+        channels = max(v.shape[0] for v in values.values() if v.ndim)
+        wide = {n: jnp.broadcast_to(v, (channels,)) for n, v in values.items()}
+        return jax.vmap(
+            lambda one: model_albedo(model, one, cos_theta, azimuth=azimuth, nodes=nodes)[
+                :, 0
+            ],
+            out_axes=1,
+        )(wide)
     shape = {n: v for n, v in values.items() if not known[n].coefficient}
     linear = {n: v for n, v in values.items() if known[n].coefficient}
     basis = [

@@ -73,9 +73,27 @@ def fit(
     options = dataclasses.replace(options or FitOptions(), **settings)
     model = model if isinstance(model, Model) else Model(model)
     say = progress or (lambda _: None)
+    options = _with_wavelengths(measurement, model, options)
     rows = select_rows(measurement, options.max_theta_deg)
     with jax.enable_x64(True):
         return _fit(measurement, rows, model, options, cross_validate, colour, say)
+
+
+def _with_wavelengths(
+    measurement: Measurement, model: Model, options: FitOptions
+) -> FitOptions:
+    """The options, with the wavelengths of the channels where a lobe asks for them."""
+    asked = [
+        name
+        for name, p in model.parameters().items()
+        if p.given and name.endswith(".wavelength") and name not in options.fix
+    ]
+    known = measurement.wavelengths
+    if not asked or known is None:
+        return options
+    return dataclasses.replace(
+        options, fix={**options.fix, **dict.fromkeys(asked, np.asarray(known))}
+    )
 
 
 def _fit(

@@ -24,6 +24,8 @@ _BUCKETS = (128, 256, 512, 1024, 1536, 2048, 3072, 4096)
 _CHUNK = 4096
 _LARGEST = 1e100
 _RECIPROCITY_PAIRS = 256
+_SAME_ANGLE = 1e-10
+_MOST_ANGLES = 512
 
 
 @dataclass(frozen=True)
@@ -172,6 +174,7 @@ def prepare(
     padded = jax.tree.map(
         lambda a, z: pad(np.asarray(a), float(np.asarray(z))), rows.geometry, normal
     )
+    angles, angle_rows = _polar_angles(rows.geometry, size, model)
     scale = float(np.sum((weight * terms.target) ** 2))
     energy = 0.0 if options.energy == "hard" else float(options.energy)
     return Problem(
@@ -182,6 +185,8 @@ def prepare(
         chunk=min(size, _CHUNK),
         penalised=penalised,
         geometry=padded,
+        angles=angles,
+        angle_rows=angle_rows,
         kappa=pad(terms.kappa, 1.0),
         weight=pad(weight),
         target=pad(terms.target),
@@ -195,6 +200,32 @@ def prepare(
     )
 
 
+def _polar_angles(g: geometry.Geometry, size: int, model: Model):
+    """The polar angles that occur and which of them every row has, or twice None.
+
+    Only where a lobe evaluates costly functions of one angle, and where the angles are few
+    as on a goniometer. Angles within 1e-10 rad are one.
+    """
+    n = np.size(g.cos_i)
+    theta = np.concatenate(
+        [
+            np.arctan2(np.hypot(g.wix, g.wiy), g.cos_i),
+            np.arctan2(np.hypot(g.wox, g.woy), g.cos_o),
+        ]
+    )
+    _, first, index = np.unique(
+        np.round(theta / _SAME_ANGLE), return_index=True, return_inverse=True
+    )
+    wanted = any(lobe.PER_ANGLE for lobe in model.lobes)
+    if not wanted or first.size > min(_MOST_ANGLES, n // 2):
+        return None, None
+    room = max(16, 1 << (first.size - 1).bit_length())
+    own = np.concatenate([theta[first], np.zeros(room - first.size)])
+    cosine = np.where(np.abs(np.cos(own)) < 1e-15, 0.0, np.cos(own))
+    rows = [jnp.asarray(np.pad(i, (0, size - n))) for i in np.split(index, 2)]
+    return (_float64(np.sin(own) ** 2), _float64(cosine)), (rows[0], rows[1])
+
+
 def _float64(a: ArrayLike) -> jax.Array:
     return jnp.asarray(a, dtype=jnp.float64)
 
@@ -205,9 +236,11 @@ def for_channel(problem: Problem, c: int) -> Problem:
     def row(a):
         return a[min(c, a.shape[0] - 1)][None]
 
+    fixed = problem.unknowns.shape_constant
     unknowns = dataclasses.replace(
         problem.unknowns,
         coefficient_constant=problem.unknowns.coefficient_constant[:, c : c + 1],
+        shape_constant=fixed[:, c : c + 1] if problem.unknowns.spectral else fixed,
         limits=problem.unknowns.limits[c : c + 1],
     )
     weight, target = row(problem.weight), row(problem.target)

@@ -10,6 +10,7 @@ by parameters) is never formed.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -18,10 +19,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from fitting import albedo, objectives, qp
-from fitting.geometry import Geometry
+from fitting.geometry import Geometry, PolarAngles
 from fitting.model import Model
 from fitting.parameters import Scale, to_value
 
@@ -35,6 +36,8 @@ class Unknowns(eqx.Module):
     """How the free unknowns make the parameters: what is fixed, tied and bounded.
 
     Parameter ``p`` is ``factor * free[index] + constant``; ``index`` is -1 if it is fixed.
+    ``shape_constant`` has one column, or one per channel where a fixed shape parameter is
+    spectral; then the basis functions are too.
     """
 
     shape_names: tuple[str, ...] = eqx.field(static=True)
@@ -43,7 +46,7 @@ class Unknowns(eqx.Module):
     coefficient_names: tuple[str, ...] = eqx.field(static=True)
     coefficient_source: tuple[tuple[int, float], ...] = eqx.field(static=True)
     n_coefficients: int = eqx.field(static=True)
-    shape_constant: Float[Array, " s"]
+    shape_constant: Float[Array, "s d"]
     lower: Float[Array, " k"]
     upper: Float[Array, " k"]
     coefficient_constant: Float[Array, "q c"]
@@ -66,14 +69,23 @@ class Unknowns(eqx.Module):
         """Number of free shape unknowns."""
         return len(self.scales)
 
-    def shape(self, u: Float[Array, " k"]) -> dict[str, Array]:
-        """All shape parameters by name."""
+    @property
+    def spectral(self) -> bool:
+        """Whether every channel has a shape of its own, by fixed values."""
+        return self.shape_constant.shape[1] > 1
+
+    def shape(
+        self, u: Float[Array, " k"], constant: Float[Array, " s"] | None = None
+    ) -> dict[str, Array]:
+        """All shape parameters by name; of one channel, whose constants are given."""
+        if constant is None:
+            constant = self.shape_constant[:, 0]
         free = [
             to_value(scale, u[i], self.lower[i], self.upper[i])
             for i, scale in enumerate(self.scales)
         ]
         return {
-            name: factor * free[index] if index >= 0 else self.shape_constant[i]
+            name: factor * free[index] if index >= 0 else constant[i]
             for i, (name, (index, factor)) in enumerate(
                 zip(self.shape_names, self.shape_source, strict=True)
             )
@@ -103,7 +115,9 @@ class Problem(eqx.Module):
     """Everything that one fit needs, padded: rows with weight 0 count for nothing.
 
     ``target`` is ``phi(y kappa)``; ``linear_target, linear_weight`` are the same residual
-    linearised at the data, from which starts are made. ``scale`` is the sum of squares of
+    linearised at the data, from which starts are made. ``angles`` are ``sin^2`` and ``cos``
+    of the polar angles that occur, where knowing them saves work, and ``angle_rows`` which
+    of them every row has, for source and detector. ``scale`` is the sum of squares of
     the weighted target, to which costs and penalties are compared.
     """
 
@@ -114,6 +128,8 @@ class Problem(eqx.Module):
     chunk: int = eqx.field(static=True)
     penalised: bool = eqx.field(static=True)
     geometry: Geometry
+    angles: tuple[Float[Array, " m"], Float[Array, " m"]] | None
+    angle_rows: tuple[Int[Array, " n"], Int[Array, " n"]] | None
     kappa: Float[Array, " n"]
     weight: Float[Array, "w n"]
     target: Float[Array, "c n"]
@@ -178,29 +194,47 @@ def _with_tangents(problem: Problem, functions, u: Array) -> Array:
     return jnp.stack([*value, *(derivatives[k][j] for j, k in pairs)])
 
 
-def _features(problem: Problem, u: Array, geometry: Geometry) -> Array:
-    return _with_tangents(
-        problem,
-        lambda v: problem.model.basis(problem.unknowns.shape(v), geometry),
-        u,
-    )
+def _features(problem: Problem, u: Array, functions: Callable) -> Array:
+    """Basis functions and their needed derivatives, ``(f, n)``, or ``(c, f, n)``.
+
+    ``functions(shape)`` gives one array per basis function.
+    """
+    unknowns = problem.unknowns
+
+    def of(constant: Array) -> Array:
+        return _with_tangents(problem, lambda v: functions(unknowns.shape(v, constant)), u)
+
+    if unknowns.spectral:
+        return jax.vmap(of)(unknowns.shape_constant.T)
+    return of(unknowns.shape_constant[:, 0])
+
+
+def _weighted(weights: Array, features: Array) -> Array:
+    """``(c, n)`` from weights ``(c, f)`` of features that channels share, or do not."""
+    if features.ndim == 2:
+        return weights @ features
+    return qp.product(jnp.swapaxes(features, 1, 2), weights)
 
 
 def _amplitudes(problem: Problem, u: Array, x: Array) -> tuple[Array, Array, Array]:
     """``a (c, b)`` and its derivatives in ``x (c, b, m)`` and ``u (c, b, k)``."""
+    unknowns = problem.unknowns
 
-    def of_channel(uc: tuple[Array, Array], constant: Array) -> Array:
-        values = problem.unknowns.coefficients(uc[1], constant)
-        shape = problem.unknowns.shape(uc[0])
+    def of_channel(uc: tuple[Array, Array], constant: Array, fixed: Array) -> Array:
+        values = unknowns.coefficients(uc[1], constant)
+        shape = unknowns.shape(uc[0], fixed)
         out = problem.model.amplitudes(shape, values)
         return jnp.stack([jnp.asarray(a, dtype=u.dtype) for a in out])
 
-    def one(xc: Array, constant: Array):
-        a = of_channel((u, xc), constant)
-        in_u, in_x = jax.jacfwd(of_channel)((u, xc), constant)
+    def one(xc: Array, constant: Array, fixed: Array):
+        a = of_channel((u, xc), constant, fixed)
+        in_u, in_x = jax.jacfwd(of_channel)((u, xc), constant, fixed)
         return a, in_x, in_u
 
-    return jax.vmap(one)(x, problem.unknowns.coefficient_constant.T)
+    fixed, along = unknowns.shape_constant.T, 0
+    if not unknowns.spectral:
+        fixed, along = fixed[0], None
+    return jax.vmap(one, (0, 0, along))(x, unknowns.coefficient_constant.T, fixed)
 
 
 def _residual(problem: Problem, f: Array, rows, linearised: Array):
@@ -228,19 +262,24 @@ def _accumulate(
     upper = jnp.triu_indices(n_features)
 
     def contract(features: Array, r: Array, d: Array):
-        products = features[upper[0]] * features[upper[1]]
-        return (d * d) @ products.T, (d * r) @ features.T, jnp.sum(r * r, axis=1)
+        products = features[..., upper[0], :] * features[..., upper[1], :]
+        over_rows = jnp.swapaxes(products, -1, -2), jnp.swapaxes(features, -1, -2)
+        return (
+            _weighted(d * d, over_rows[0]),
+            _weighted(d * r, over_rows[1]),
+            jnp.sum(r * r, axis=1),
+        )
 
     def chunk(rows):
-        geometry, *data = rows
-        features = _features(problem, u, geometry)
-        f = a @ features[:n_basis]
+        geometry, *data = _located(problem, rows)
+        features = _features(problem, u, lambda s: problem.model.basis(s, geometry))
+        f = _weighted(a, features[..., :n_basis, :])
         return contract(features, *_residual(problem, f, data, linearised))
 
     total = _sum_chunks(problem, chunk)
     if problem.penalised:
         for features, phi in _penalty_rows(problem, u):
-            r, d = phi(a @ features[:n_basis])
+            r, d = phi(_weighted(a, features[..., :n_basis, :]))
             total = jax.tree.map(jnp.add, total, contract(features, r, d))
     gram, gradient, cost = total
     full = jnp.zeros((gram.shape[0], n_features, n_features), gram.dtype)
@@ -253,6 +292,7 @@ def _sum_chunks(problem: Problem, chunk: Callable):
     """Sum of ``chunk(rows)`` over blocks of rows: memory does not grow with them."""
     rows = (
         problem.geometry,
+        problem.angle_rows,
         problem.kappa,
         problem.weight,
         problem.target,
@@ -278,14 +318,22 @@ def _sum_chunks(problem: Problem, chunk: Callable):
     return jax.lax.scan(add, zero, chunks)[0]
 
 
+def _located(problem: Problem, rows: tuple) -> tuple:
+    """The rows, whose geometry now knows the table of the polar angles."""
+    geometry, angle_rows, *data = rows
+    if problem.angles is not None:
+        polar = PolarAngles(*problem.angles, *angle_rows)
+        geometry = dataclasses.replace(geometry, polar=polar)
+    return geometry, *data
+
+
 def _penalty_rows(problem: Problem, u: Array):
     """Features of the penalties and how their residual follows from them."""
-    model, unknowns = problem.model, problem.unknowns
+    model = problem.model
     cosines = jnp.asarray(ENERGY_COSINES, dtype=u.dtype)
     azimuths = (0.0, 0.5 * math.pi) if model.anisotropic else (0.0,)
 
-    def energy(v: Array) -> tuple[Array, ...]:
-        shape = unknowns.shape(v)
+    def energy(shape: dict[str, Array]) -> tuple[Array, ...]:
         out: list[Array] = []
         for i, lobe in enumerate(model.lobes):
             own = model.of_lobe(i, shape)
@@ -300,11 +348,10 @@ def _penalty_rows(problem: Problem, u: Array):
         w = jnp.sqrt(problem.energy_weight / total.shape[1])
         return w * jax.nn.relu(total - 1.0), w * (total > 1.0)
 
-    yield _with_tangents(problem, energy, u), hinge
+    yield _features(problem, u, energy), hinge
     if not all(lobe.RECIPROCAL for lobe in model.lobes):
 
-        def difference(v: Array) -> tuple[Array, ...]:
-            shape = unknowns.shape(v)
+        def difference(shape: dict[str, Array]) -> tuple[Array, ...]:
             there = model.basis(shape, problem.pairs)
             back = model.basis(shape, problem.pairs.swapped)
             return tuple(f - b for f, b in zip(there, back, strict=True))
@@ -313,7 +360,7 @@ def _penalty_rows(problem: Problem, u: Array):
             w = jnp.sqrt(problem.reciprocity_weight / total.shape[1])
             return w * total, w * jnp.ones_like(total)
 
-        yield _with_tangents(problem, difference, u), plain
+        yield _features(problem, u, difference), plain
 
 
 def evaluate(problem: Problem, u: Array, x: Array, linearised: Bool[Array, ""]) -> Blocks:
@@ -374,16 +421,17 @@ def sum_over_rows(
     to_x, to_u = _columns(problem, a, da_dx, da_du)
 
     def chunk(rows):
-        geometry, *data = rows
-        features = _features(problem, u, geometry)
-        f = a @ features[: a.shape[1]]
+        geometry, *data = _located(problem, rows)
+        features = _features(problem, u, lambda s: problem.model.basis(s, geometry))
+        f = _weighted(a, features[..., : a.shape[1], :])
         r, d = _residual(problem, f, data, jnp.asarray(False))
+        axes = "fn" if features.ndim == 2 else "cfn"
         return function(
             f,
             r,
             jnp.broadcast_to(d, r.shape),
-            jnp.einsum("cfm,fn->cmn", to_x, features),
-            jnp.einsum("cfk,fn->ckn", to_u, features),
+            jnp.einsum(f"cfm,{axes}->cmn", to_x, features),
+            jnp.einsum(f"cfk,{axes}->ckn", to_u, features),
         )
 
     return _sum_chunks(problem, chunk)

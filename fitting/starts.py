@@ -104,6 +104,7 @@ def _thinned(problem: Problem) -> Problem:
         problem,
         chunk=_SCAN_ROWS,
         geometry=jax.tree.map(take, problem.geometry),
+        angle_rows=jax.tree.map(take, problem.angle_rows),
         **{
             name: take(getattr(problem, name))
             for name in ("kappa", "weight", "target", "linear_target", "linear_weight")

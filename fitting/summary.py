@@ -43,6 +43,14 @@ class Found:
             for x, c in zip(np.asarray(self.solution.x), constant.T, strict=True)
         ]
         own = {n: np.asarray(v) for n, v in shape.items()}
+        for name, constant, (index, _) in zip(
+            unknowns.shape_names,
+            np.asarray(unknowns.shape_constant),
+            unknowns.shape_source,
+            strict=True,
+        ):
+            if index < 0 and np.ptp(constant) > 0:
+                own[name] = constant
         return own | {
             n: np.asarray([float(one[n]) for one in linear])
             for n in unknowns.coefficient_names

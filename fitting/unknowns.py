@@ -44,6 +44,12 @@ def make_unknowns(model: Model, n_channels: int, options: FitOptions) -> Unknown
         if name in fixed or name in ties:
             how = "fixed" if name in fixed else "tied"
             raise ModelError(f"{name} is {how} and cannot have bounds as well")
+    for name, parameter in declared.items():
+        if parameter.given and name not in fixed:
+            raise ModelError(
+                f"{name} ({parameter.meaning}) is not known; fix it at one value, or at "
+                f"{n_channels}, one per channel"
+            )
     free = [n for n in declared if n not in fixed and n not in ties]
     shape_free = [n for n in free if not declared[n].coefficient]
     linear_free = [n for n in free if declared[n].coefficient]
@@ -80,9 +86,7 @@ def make_unknowns(model: Model, n_channels: int, options: FitOptions) -> Unknown
         coefficient_names=tuple(linear_names),
         coefficient_source=linear_source,
         n_coefficients=len(linear_free),
-        shape_constant=jnp.asarray(
-            [float(np.ravel(fixed.get(n, 0.0))[0]) for n in shape_names]
-        ),
+        shape_constant=jnp.asarray(_columns([fixed.get(n, 0.0) for n in shape_names])),
         lower=jnp.asarray([low for low, _ in supports]),
         upper=jnp.asarray([high for _, high in supports]),
         coefficient_constant=jnp.asarray(constant),
@@ -119,16 +123,24 @@ def _check_fixed(name: str, value: Value, parameter: Parameter, n_channels: int)
         values = np.atleast_1d(np.asarray(value, dtype=np.float64))
     except (TypeError, ValueError):
         values = np.array([math.nan])
-    sizes = (1, n_channels) if parameter.coefficient else (1,)
-    if values.size not in sizes or not np.all(np.isfinite(values)):
+    if values.size not in (1, n_channels) or not np.all(np.isfinite(values)):
         raise ModelError(
-            f"{name} is fixed at {value}: expected one finite number"
-            + (f" or {n_channels}, one per channel" if parameter.coefficient else "")
+            f"{name} is fixed at {value}: expected one finite number or {n_channels}, one "
+            "per channel"
         )
     low, high = parameter.support
     outside = (values < low) | (values > high)
     if parameter.scale != "periodic" and outside.any():
         raise ModelError(f"{name} is fixed at {value}, outside [{low:g}, {high:g}]")
+
+
+def _columns(values: list[Value]) -> np.ndarray:
+    """One row per value; one column, or one per channel if a value has as many."""
+    if not values:
+        return np.zeros((0, 1))
+    rows = [np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in values]
+    width = max(r.size for r in rows)
+    return np.stack([np.broadcast_to(r, width) for r in rows])
 
 
 def _support(

@@ -46,7 +46,7 @@ class Skewed(Lobe):
     def amplitudes(self, shape, coefficients):
         return coefficients
 
-    def slope_widths(self, shape):
+    def peak(self, shape):
         return None
 
 

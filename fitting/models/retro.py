@@ -24,6 +24,7 @@ class Retro(Lobe):
     RECIPROCAL: ClassVar[bool] = True
     LINEAR: ClassVar[bool] = True
     ALBEDO_BOUND: ClassVar[float | None] = 1.0
+    PER_ANGLE: ClassVar[bool] = True
 
     inner: Lobe
 
