@@ -18,6 +18,7 @@ from data_formats import Measurement
 from fitting import diagnostics, judge, problem, summary
 from fitting.albedo import model_albedo
 from fitting.expression import ModelError
+from fitting.given import with_given
 from fitting.model import Model
 from fitting.options import FitOptions
 from fitting.predict import predict_geometry
@@ -73,27 +74,10 @@ def fit(
     options = dataclasses.replace(options or FitOptions(), **settings)
     model = model if isinstance(model, Model) else Model(model)
     say = progress or (lambda _: None)
-    options = _with_wavelengths(measurement, model, options)
+    options = with_given(measurement, model, options)
     rows = select_rows(measurement, options.max_theta_deg)
     with jax.enable_x64(True):
         return _fit(measurement, rows, model, options, cross_validate, colour, say)
-
-
-def _with_wavelengths(
-    measurement: Measurement, model: Model, options: FitOptions
-) -> FitOptions:
-    """The options, with the wavelengths of the channels where a lobe asks for them."""
-    asked = [
-        name
-        for name, p in model.parameters().items()
-        if p.given and name.endswith(".wavelength") and name not in options.fix
-    ]
-    known = measurement.wavelengths
-    if not asked or known is None:
-        return options
-    return dataclasses.replace(
-        options, fix={**options.fix, **dict.fromkeys(asked, np.asarray(known))}
-    )
 
 
 def _fit(
@@ -274,6 +258,7 @@ def _settings(objective: str, options: FitOptions) -> Settings:
         fix={k: [float(x) for x in np.atleast_1d(v)] for k, v in options.fix.items()},
         bounds={k: (end(a), end(b)) for k, (a, b) in options.bounds.items()},
         tie=dict(options.tie),
+        material=dict(options.material),
     )
 
 

@@ -33,6 +33,8 @@ class FitOptions:
       reciprocal by construction need none.
     - ``fix``, ``bounds``, ``tie``: by parameter name, with ``*`` for any part:
       ``{"ggx.f90": 1.0}``, ``{"ggx.alpha": (0.01, 0.3)}``, ``{"ggx.f0": "0.04*ggx.f90"}``.
+    - ``material``: by lobe, what fixes its index in every channel: ``{"ggx": "Au"}``, or a
+      file; see `fitting.refractive_index`.
     - ``per_channel_shape``: shape parameters of every channel for itself.
     - ``starts``: number of starting points that are refined to the end.
     """
@@ -47,6 +49,7 @@ class FitOptions:
     fix: Mapping[str, Value] = field(default_factory=dict)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     tie: Mapping[str, str] = field(default_factory=dict)
+    material: Mapping[str, str] = field(default_factory=dict)
     per_channel_shape: bool = False
     starts: int = 8
 
@@ -79,7 +82,7 @@ class FitOptions:
             len(noise) == 2 and all(_is_number(v) and v >= 0 for v in noise) and any(noise)
         ):
             refuse("noise", "two numbers from 0 on, not both 0")
-        for name in ("fix", "bounds", "tie"):
+        for name in ("fix", "bounds", "tie", "material"):
             if not isinstance(getattr(self, name), Mapping):
                 refuse(name, "a mapping from parameter names")
         for name, bound in self.bounds.items():

@@ -185,6 +185,7 @@ class Settings(msgspec.Struct, frozen=True):
     fix: dict[str, list[float]]
     bounds: dict[str, tuple[float | None, float | None]]
     tie: dict[str, str]
+    material: dict[str, str] = {}
 
 
 class Solver(msgspec.Struct, frozen=True):

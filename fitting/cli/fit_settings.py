@@ -16,7 +16,8 @@ from fitting.cli.fit_choices import Choices, ObjectiveChoice, WeightsChoice
 
 _BOOLEAN = ("per-channel-shape", "robust", "cv", "colour", "json")
 _NUMBERS = ("max-theta", "reciprocity")
-_NAMED = ("fix", "bounds", "tie", "reader")
+_BY_PARAMETER = ("fix", "bounds", "tie", "material")
+_NAMED = (*_BY_PARAMETER, "reader")
 _TEXT = ("format", "output")
 
 
@@ -80,7 +81,10 @@ def _job(said: Mapping[str, Any]) -> Job:
             _boolean(key, value)
         if key in _TEXT and not isinstance(value, str | Path):
             raise UsageError(f"--{key}: found {value!r}, expected text")
-        if key in ("fix", "bounds", "tie") or key in ("robust", "per-channel-shape"):
+        if key in ("fix", "bounds", "tie", "material") or key in (
+            "robust",
+            "per-channel-shape",
+        ):
             options[key.replace("-", "_")] = value
         elif key in _NUMBERS:
             options[key.replace("-", "_")] = _number(key, value)
