@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array
 
 from fitting.geometry import Geometry
@@ -61,7 +62,11 @@ class GTR(Lobe):
         return microfacet.amplitudes(self, _facets(shape), shape, coefficients)
 
     def peak(self, shape: Shape) -> SlopeWidths:
-        return microfacet.slope_widths(shape)
+        """Nodes between the width and 1, over which a tail below ``gamma = 2`` reaches."""
+        alpha = shape["alpha"]
+        reach = jnp.minimum((shape["gamma"] - 0.2) / 1.8, 1.0)
+        width = jnp.exp(reach * jnp.log(alpha))
+        return SlopeWidths(width, width, jnp.zeros_like(alpha))
 
 
 def _facets(shape: Shape) -> microfacet.Facets:
