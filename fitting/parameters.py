@@ -20,13 +20,14 @@ Scale = Literal["log", "linear", "periodic"]
 class Parameter:
     """A parameter of a lobe, declared once.
 
-    A *coefficient* multiplies a basis function, is linear, and has one value per channel.
-    A *shape* parameter enters nonlinearly and is shared by all channels unless asked
-    otherwise. A *given* one is a shape parameter that is known, one value per channel, and
-    never fitted. ``support`` is the closed interval of meaningful values; ``start`` the
-    interval from which starting values are taken. ``scale`` tells how a shape parameter
-    is spread over its support: ``log``, ``linear``, or ``periodic`` (then ``support`` is
-    one period and there is no bound).
+    A *coefficient* multiplies a basis function, is linear, and has one value per channel;
+    it is an ``amplitude`` if the lobe's albedo grows with it. A *shape* parameter enters
+    nonlinearly and is shared by all channels unless asked otherwise. A *given* one is a
+    shape parameter that is known, one value per channel, and never fitted. ``support`` is
+    the closed interval of meaningful values; ``start`` the interval from which starting
+    values are taken. ``scale`` tells how a shape parameter is spread over its support:
+    ``log``, ``linear``, or ``periodic`` (then ``support`` is one period and there is no
+    bound).
     """
 
     name: str
@@ -36,6 +37,7 @@ class Parameter:
     meaning: str
     coefficient: bool = False
     given: bool = False
+    amplitude: bool = True
     scale: Scale = "linear"
     start: tuple[float, float] = (math.nan, math.nan)
 
@@ -72,9 +74,12 @@ def coefficient(
     *,
     support: tuple[float, float] = (0.0, math.inf),
     unit: str = "1",
+    amplitude: bool = True,
 ) -> Parameter:
     """Declare a coefficient: linear, one value per channel."""
-    return Parameter(name, default, support, unit, meaning, coefficient=True)
+    return Parameter(
+        name, default, support, unit, meaning, coefficient=True, amplitude=amplitude
+    )
 
 
 def given(

@@ -198,30 +198,35 @@ def _constraints(
             rows.append(-unit)
             limits.append(-high * ones)
     if options.energy == "hard":
-        # With every lobe's albedo at most its largest coefficient, it is enough that the
-        # sum over lobes of any one coefficient each stays below 1.
-        groups: list[list[int]] = []
+        # With every lobe's albedo at most its bound times its largest coefficient, it is
+        # enough that the sum over lobes of any one of these each stays below 1.
+        groups: list[list[tuple[int, float]]] = []
         for label, lobe in zip(model.labels, model.lobes, strict=True):
             if lobe.albedo_bound is None:
                 raise ModelError(
                     f"energy 'hard' needs lobes of bounded albedo; {label} has no bound"
                 )
-            own = [i for i, n in enumerate(names) if n.rpartition(".")[0] == label]
-            groups.append(own)
+            own = [
+                i
+                for i, n in enumerate(names)
+                if n.rpartition(".")[0] == label and declared[n].amplitude
+            ]
+            groups.append([(i, lobe.albedo_bound) for i in own])
         for choice in itertools.product(*groups):
             row, limit, least = np.zeros(len(free)), -ones, 0.0 * ones
-            for i in choice:
+            for i, bound in choice:
                 index, factor = source[i]
                 if index >= 0:
-                    row[index] -= factor
+                    row[index] -= bound * factor
                     low = _ends(bounds.get(free[index]), declared[free[index]])[0]
-                    least = least + factor * max(low, 0.0)
+                    least = least + bound * factor * max(low, 0.0)
                 else:
-                    limit = limit + constant[i]
-                    least = least + constant[i]
+                    limit = limit + bound * constant[i]
+                    least = least + bound * constant[i]
             if np.any(least > 1.0 + 1e-12):
+                total = " + ".join(names[i] for i, _ in choice)
                 raise ModelError(
-                    f"energy 'hard' cannot hold: {' + '.join(names[i] for i in choice)} is "
+                    f"energy 'hard' cannot hold: {total} is "
                     f"at least {least.max():g} by what is fixed or bounded; it must be "
                     "able to stay below 1"
                 )

@@ -34,7 +34,7 @@ def parameters(kind: Fresnel) -> tuple[Parameter, ...]:
             *ends,
             coefficient(
                 "tint", 1.0, "share of Schlick's reflectance that is left at 81.8 degrees",
-                support=(0.0, 1.0),
+                support=(0.0, 1.0), amplitude=False,
             ),
         )  # fmt: skip
     if kind == "generalised":
