@@ -24,6 +24,23 @@ OPTIONS: dict[str, tuple[str, object]] = {
     "retro": ("retro", True),
 }
 
+MEANINGS: dict[str, str] = {
+    "iso": "the same in every direction of the sample",
+    "aniso": "two widths and the azimuth of the first",
+    "schlick": "Schlick's Fresnel term with a free grazing value",
+    "dielectric": "exact Fresnel term of a transparent material, by its index",
+    "conductor": "exact Fresnel term of a metal; see --material",
+    "f82": "Schlick's with the dip of metals at 81.8 degrees",
+    "generalised": "Schlick's with a free exponent",
+    "correlated": "Smith's shadowing for the heights of one surface",
+    "uncorrelated": "Smith's shadowing, both directions on their own",
+    "v_cavity": "shadowing of V-shaped grooves, as Cook and Torrance have it",
+    "bare": "D F / 4: no shadowing, no 1 / (cos_i cos_o); for metal flakes",
+    "ms": "with what is scattered more than once (Kulla and Conty)",
+    "spectral": "one surface for all wavelengths, scaled as theory has it",
+    "retro": "turned around: shines back at the source",
+}
+
 
 def options_of(lobe: Any) -> list[str]:
     """The words for the options that a class of lobes has."""

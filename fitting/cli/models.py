@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
 
 
 def models(
-    name: Annotated[str | None, Parameter(help="Of a lobe, to describe it.")] = None,
+    name: Annotated[
+        str | None, Parameter(help="Of a lobe, or the file of your own, to describe it.")
+    ] = None,
     /,
     *,
     flags: DebugFlag | None = None,
@@ -41,14 +44,13 @@ def _list(out: Console) -> None:
     from fitting.cli.terminal import table
     from fitting.models import lobe_class
 
-    rows = table("lobe", "parameters", "reciprocal", "albedo", "what it is", left=5)
+    rows = table("lobe", "reciprocal", "albedo", "what it is", left=4)
     for name in _names():
         lobe = lobe_class(name)
         rows.add_row(
             name,
-            ", ".join(p.name for p in lobe().parameters()),
             "yes" if lobe.RECIPROCAL else "no",
-            "no bound" if lobe.ALBEDO_BOUND is None else f"<= {lobe.ALBEDO_BOUND:g}",
+            "no bound" if lobe.ALBEDO_BOUND is None else f"<= {lobe.ALBEDO_BOUND:.4g}",
             _first_line(lobe),
         )
     out.print(rows)
@@ -62,13 +64,13 @@ def _list(out: Console) -> None:
 def _describe(out: Console, name: str) -> None:
     from fitting.cli.assignments import nearest
     from fitting.cli.terminal import bullet, heading
-    from fitting.expression import OPTIONS, options_of
+    from fitting.expression import MEANINGS, OPTIONS, options_of
     from fitting.models import lobe_class
 
-    if name not in _names():
+    if name not in _names() and not name.endswith(".py"):
         raise UsageError(f"there is no lobe {name!r}{nearest(name, _names())}")
     lobe = lobe_class(name)
-    out.print(f"{name}: {_first_line(lobe)}", style="bold")
+    out.print(f"{lobe.NAME}: {_first_line(lobe)}", style="bold")
     out.print()
     out.print(inspect.cleandoc(lobe.__doc__ or "").replace("``", ""))
     out.print(heading("Parameters"))
@@ -76,13 +78,15 @@ def _describe(out: Console, name: str) -> None:
     options = options_of(lobe)
     if options:
         out.print(heading("Options"))
+        usual = {p.name for p in lobe().parameters()}
         for option in options:
             field, value = OPTIONS[option]
-            default = lobe.__dataclass_fields__[field].default == value
-            said = f"{name}({option})" + (", the default" if default else "")
+            own = lobe.__dataclass_fields__.get(field)
+            default = own is not None and own.default == value
+            said = f"{option}: {MEANINGS[option]}" + (" (the default)" if default else "")
             bullet(out, said)
-            if not default:
-                _parameters(out, lobe, **{field: value})
+            if own is not None and not default:
+                _parameters(out, lobe, usual, **{field: value})
     out.print(heading("Facts"))
     bullet(out, "reciprocal" if lobe.RECIPROCAL else "not reciprocal")
     if lobe.ALBEDO_BOUND is None:
@@ -92,11 +96,20 @@ def _describe(out: Console, name: str) -> None:
     bullet(out, f"reference: {lobe.REFERENCE}")
 
 
-def _parameters(out: Console, lobe: type[Lobe], **options: object) -> None:
+def _parameters(
+    out: Console,
+    lobe: type[Lobe],
+    but: Collection[str] = (),
+    **options: object,
+) -> None:
+    """A table of the parameters, but for those said before; nothing if none is left."""
     from fitting.cli.terminal import table
 
+    listed = [p for p in lobe(**options).parameters() if p.name not in but]
+    if not listed:
+        return
     rows = table("name", "support", "default", "unit", "per channel", "meaning", left=6)
-    for p in lobe(**options).parameters():
+    for p in listed:
         rows.add_row(
             p.name,
             _support(p),
