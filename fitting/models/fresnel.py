@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import jax.numpy as jnp
@@ -149,22 +150,34 @@ def conductor(cos_d: Array, eta: Array, k: Array) -> Array:
     In real arithmetic, with ``s2 = 1 - c^2``, ``t = eta^2 - k^2 - s2`` and ``a + i b`` the
     root of ``t + 2 i eta k`` (Born and Wolf, 14.2)::
 
-        1 - R_s = 4 a c / ((a + c)^2 + b^2)
-        1 - R_p / R_s = 4 a c s2 / ((a c + s2)^2 + (b c)^2)
+        R_s = ((a - c)^2 + b^2) / ((a + c)^2 + b^2)
+        R_p / R_s = ((a c - s2)^2 + (b c)^2) / ((a c + s2)^2 + (b c)^2)
 
-    Of ``a`` and ``b`` the larger comes from a root and the other from ``eta k``, so that
-    nothing cancels: what a good mirror absorbs keeps its digits.
+    Of ``a`` and ``b`` the larger comes from a root and the other from ``eta k``, and
+    ``a - c = (eta^2 - 1 + s2 k^2 / (a^2 + k^2)) / (a + c)``, so that nothing cancels: a
+    metal that hardly absorbs and an index next to 1 both keep their digits. At the index 1
+    exactly and grazing incidence the limit is not one; it is taken as 1.
     """
     s2 = jnp.maximum((1.0 - cos_d) * (1.0 + cos_d), 0.0)
-    t = (eta - k) * (eta + k) - s2
+    # Next to grazing an index of 1, and next to normal one of 0, leaves little of t.
+    steep = (eta - k) * (eta + k) - s2
+    t = jnp.where(cos_d > 0.7, steep, (eta - 1.0) * (eta + 1.0) - k * k + cos_d * cos_d)
     product = eta * k
-    m = jnp.sqrt(jnp.maximum(t * t + 4.0 * product * product, jnp.finfo(t.dtype).tiny))
+    # The root of zero has no derivative; this little one is lost beside anything else.
+    least = math.sqrt(jnp.finfo(t.dtype).tiny)
+    m = jnp.sqrt(t * t + 4.0 * product * product + least)
     larger = jnp.sqrt(0.5 * (m + jnp.abs(t)))
     smaller = product / larger
     a, b = jnp.where(t >= 0, larger, smaller), jnp.where(t >= 0, smaller, larger)
-    s_loss = 4.0 * a * cos_d / ((a + cos_d) ** 2 + b * b)
-    q = a * cos_d + s2
-    p_below = q * q + (b * cos_d) ** 2
-    some = p_below > 0
-    p_loss = jnp.where(some, 4.0 * a * cos_d * s2 / jnp.where(some, p_below, 1.0), 0.0)
-    return 1.0 - 0.5 * (s_loss + s_loss + p_loss * (1.0 - s_loss))
+    b2 = b * b
+    # k / a = b / eta: of the two quotients the one whose divisor is the root.
+    beside, above = jnp.where(t >= 0, k, b), jnp.where(t >= 0, a, eta)
+    share = beside * beside / (above * above + beside * beside)
+    inside = (eta - 1.0) * (eta + 1.0) + share * s2
+    total = jnp.maximum(a + cos_d, math.sqrt(least))
+    alike = (t >= 0) & (a < 2.0 * cos_d) & (cos_d < 2.0 * a)
+    difference = jnp.where(alike, inside / total, a - cos_d)
+    rs = (difference**2 + b2) / (total**2 + b2)
+    across, depth = a * cos_d, b2 * cos_d * cos_d
+    ratio = ((across - s2) ** 2 + depth) / ((across + s2) ** 2 + depth)
+    return jnp.where(cos_d > 0, 0.5 * rs * (1.0 + ratio), 1.0)
