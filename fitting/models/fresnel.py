@@ -78,7 +78,14 @@ def split(kind: Fresnel, shape: Shape, value: Array, cos_d: Array) -> tuple[Arra
     p = jnp.maximum(1.0 - cos_d, 0.0)
     if kind == "generalised":
         some = p > 0
-        logarithm = shape["power"] * jnp.log(jnp.where(some, p, 1.0))
+        # log1p keeps the digits of a small cos_d; XLA's loses some of them further out.
+        small = cos_d < 0.25
+        logarithm = jnp.where(
+            small,
+            jnp.log1p(-jnp.where(small, cos_d, 0.0)),
+            jnp.log(jnp.where(some, p, 1.0)),
+        )
+        logarithm = shape["power"] * logarithm
         rest = jnp.where(some, -jnp.expm1(logarithm), 1.0)
         return value * rest, value * jnp.where(some, jnp.exp(logarithm), 0.0)
     # 1 - q written as a product keeps its digits at grazing, where q goes to 1.
