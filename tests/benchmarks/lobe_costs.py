@@ -1,0 +1,174 @@
+"""What a lobe costs, the README's table: ``python tests/benchmarks/lobe_costs.py``.
+
+Time per evaluation of the compiled basis functions and of their Jacobian by all shape
+parameters, at many pairs of directions at once, in units of Lambert's value in float32
+in the same run; the same source run by plain numpy instead; and what the compiler counts,
+which does not depend on the machine.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from types import ModuleType
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.special
+
+from fitting.geometry import Geometry, from_angles
+from fitting.model import Model
+from fitting.models import LOBES
+
+COUNT = 1 << 17
+REPEATS = 7
+HEADER = (
+    "| lobe | value, f32 | f64 | Jacobian, f32 | f64 | numpy / compiled, f64 | flops | "
+    "transcendentals |\n|---|---|---|---|---|---|---|---|"
+)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Seconds per evaluation; operations per evaluation as the compiler counts them."""
+
+    value: dict[str, float]
+    jacobian: dict[str, float]
+    numpy: float
+    flops: float
+    transcendentals: float
+
+
+def directions(count: int) -> Geometry:
+    """Pairs of directions all over the hemisphere, half of them near the mirror."""
+    rng = np.random.default_rng(0)
+    theta_i, theta_r = np.arccos(rng.uniform(0.05, 1.0, (2, count)))
+    phi = rng.uniform(0, 2 * np.pi, count)
+    near = rng.random(count) < 0.5
+    theta_r = np.where(near, np.clip(theta_i + rng.normal(0, 0.1, count), 0, 1.5), theta_r)
+    return from_angles(theta_i, 0.0, theta_r, np.where(near, np.pi + 0.2 * phi, phi))
+
+
+def seconds(run: Callable[[], object], repeats: int = REPEATS) -> float:
+    """Least time of a call, which other load disturbs least."""
+    best = np.inf
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        run()
+        best = min(best, time.perf_counter() - begin)
+    return best
+
+
+@contextlib.contextmanager
+def plain_numpy() -> Iterator[None]:
+    """Lobes computed by numpy: their source is elementwise and numpy has the same names."""
+    names = ("erfc", "gammaln", "gammaincc", "expit")
+    special = {n: getattr(scipy.special, n) for n in names}
+    before: list[tuple[ModuleType, str, object]] = []
+    for module in _modules():
+        for name, value in vars(module).copy().items():
+            other = np if value is jnp else special.get(name)
+            if other is not None and (value is jnp or callable(value)):
+                before.append((module, name, value))
+                setattr(module, name, other)
+    try:
+        yield
+    finally:
+        for module, name, value in before:
+            setattr(module, name, value)
+
+
+def _modules() -> list[ModuleType]:
+    for name in LOBES:
+        importlib.import_module(f"fitting.models.{name}")
+    return [
+        m
+        for n, m in sys.modules.items()
+        if n.startswith("fitting.models.")
+        or n in ("fitting.geometry", "fitting.quadrature")
+    ]
+
+
+def cost(expression: str, count: int = COUNT) -> Cost:
+    """What one lobe costs."""
+    lobe = Model(expression).lobes[0]
+    plain = {p.name: p.default for p in lobe.parameters() if not p.coefficient}
+    g = directions(count)
+    value: dict[str, float] = {}
+    jacobian: dict[str, float] = {}
+    counted: dict[str, float] = {}
+    for name, x64 in (("f32", False), ("f64", True)):
+        with jax.enable_x64(x64):
+            shape = {n: jnp.asarray(v) for n, v in plain.items()}
+            geometry = jax.tree.map(jnp.asarray, g)
+
+            def basis(shape, geometry):
+                return lobe.basis(shape, geometry)
+
+            def with_tangents(shape, geometry):
+                slopes = jax.jacfwd(basis)(shape, geometry) if shape else ()
+                return basis(shape, geometry), slopes
+
+            compiled = jax.jit(basis).lower(shape, geometry).compile()
+            value[name] = _per_evaluation(compiled, shape, geometry, count)
+            counted = compiled.cost_analysis() or {}
+            both = jax.jit(with_tangents).lower(shape, geometry).compile()
+            jacobian[name] = _per_evaluation(both, shape, geometry, count)
+    few = directions(count // 8)
+    numbers = {n: np.float64(v) for n, v in plain.items()}
+    with plain_numpy(), np.errstate(all="ignore"):
+        numpy = seconds(lambda: lobe.basis(numbers, few), 3) / (count // 8)
+    return Cost(
+        value,
+        jacobian,
+        numpy,
+        counted.get("flops", 0.0) / count,
+        counted.get("transcendentals", 0.0) / count,
+    )
+
+
+def _per_evaluation(compiled, shape, geometry, count: int) -> float:
+    def run() -> None:
+        jax.block_until_ready(compiled(shape, geometry))
+
+    run()
+    return seconds(run) / count
+
+
+def row(name: str, own: Cost, unit: float) -> str:
+    """One line of the table; ``unit`` is Lambert's time in float32."""
+    times = (own.value["f32"], own.value["f64"], own.jacobian["f32"], own.jacobian["f64"])
+    cells = [f"{t / unit:.3g}" for t in times]
+    cells += [f"{own.numpy / own.value['f64']:.2g}"]
+    cells += [f"{own.flops:.0f}", f"{own.transcendentals:.0f}"]
+    return f"| `{name}` | " + " | ".join(cells) + " |"
+
+
+def variants() -> list[str]:
+    """Every lobe, and the options that cost something."""
+    options = ("aniso", "dielectric", "conductor", "f82", "uncorrelated", "v_cavity",
+               "bare", "ms", "retro")  # fmt: skip
+    return [
+        expression
+        for name in LOBES
+        for expression in (name, *(f"ggx({o})" for o in options if name == "ggx"))
+    ]
+
+
+def main(names: list[str]) -> None:
+    """Print the table, a line at a time."""
+    unit = cost("lambert").value["f32"]
+    print(HEADER)
+    for name in names or variants():
+        print(row(name, cost(name), unit), flush=True)
+        eqx.clear_caches()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
