@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from data_formats import Measurement, MeasurementError, read, write
     from fitting.comparison import Comparison, compare
+    from fitting.conversion import resample
     from fitting.expression import ModelError
     from fitting.fitter import fit
     from fitting.geometry import Geometry, from_angles
@@ -29,6 +30,7 @@ _HOME = {
     "write": "data_formats",
     "Comparison": "fitting.comparison",
     "compare": "fitting.comparison",
+    "resample": "fitting.conversion",
     "ModelError": "fitting.expression",
     "fit": "fitting.fitter",
     "Geometry": "fitting.geometry",
@@ -60,6 +62,7 @@ __all__ = [
     "json_schema",
     "load_result",
     "read",
+    "resample",
     "score",
     "write",
 ]

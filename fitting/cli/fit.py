@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 def fit(
     file: Annotated[
         Path | None,
-        Parameter(help="A file of measured reflectance. Without: the bundled sample."),
+        Parameter(
+            help="A file of measured reflectance, or NAME.fit.json to convert that fit to "
+            "another model. Without: the bundled sample."
+        ),
     ] = None,
     /,
     *,

@@ -12,12 +12,23 @@ from fitting.cli.failures import UsageError
 if TYPE_CHECKING:
     from data_formats import Measurement
 
+RESULT_SUFFIX = ".fit.json"
+
 
 def read_file(
     path: Path, format: str | None, reader: Mapping[str, Any] | None = None
 ) -> Measurement:
-    """The measurement of a file; ``reader`` are options of the format's own reader."""
+    """The measurement of a file; ``reader`` are options of the format's own reader.
+
+    A fit result stands for the values of its model, so that another can be fitted to it.
+    """
     import data_formats
+
+    if path.name.endswith(RESULT_SUFFIX):
+        from fitting.conversion import resample
+        from fitting.result import load_result
+
+        return resample(load_result(path))
 
     if format is not None:
         known = [f.name for f in data_formats.formats()]
@@ -54,7 +65,12 @@ def _term(line: str) -> tuple[str, str]:
 
 
 def stem(path: Path) -> str:
-    """The name of a file without its suffix, and without ``.gz``."""
+    """The name of a file without its suffix, and without ``.gz``.
+
+    A converted result gets a name that does not overwrite the first one.
+    """
+    if path.name.endswith(RESULT_SUFFIX):
+        return f"{path.name.removesuffix(RESULT_SUFFIX)}.converted"
     name = path.name.removesuffix(".gz")
     return Path(name).stem or name
 
