@@ -13,6 +13,7 @@ _COMMANDS = {
     "convert": "Write a file of measured reflectance in another format.",
     "models": "List the models, or describe one in full.",
     "formats": "List the file formats, or describe one in full.",
+    "stress": "Put lobes to the test: contracts, and rounding errors against 50 digits.",
     "doctor": "Check that the installation works.",
 }
 
@@ -39,6 +40,13 @@ Examples:
     "convert": "Example: brdf convert paint.astm paint.csv\n",
     "models": "Examples: brdf models; brdf models ggx\n",
     "formats": "Examples: brdf formats; brdf formats csv\n",
+    "stress": """\
+Examples:
+  brdf stress                     every lobe with every option, some minutes
+  brdf stress 'ggx(aniso)'        one of them, at more points
+  brdf stress ggx --options       one with all its options
+  brdf stress my_lobe.py          a lobe of your own
+""",
     "doctor": "",
 }
 

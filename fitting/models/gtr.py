@@ -19,7 +19,7 @@ class GTR(Lobe):
 
     Burley 2012, appendix B. ``gamma = 2`` is GGX, 1 is Berry's longer tail. Other than
     ``gamma = 2`` it is not invariant to a stretch of the slopes, so there is no anisotropic
-    form, and Smith's shadowing is integrated (40 nodes; error of ``G1`` below 1e-5), where
+    form, and Smith's shadowing is integrated (56 nodes; relative error below 1e-6), where
     Disney takes that of GGX, which does not bound the albedo.
     """
 
@@ -42,6 +42,11 @@ class GTR(Lobe):
     @property
     def linear(self) -> bool:
         return fresnel.linear(self.fresnel)
+
+    @property
+    def relative_error(self) -> float:
+        """That of the shadowing's quadrature."""
+        return 4e-7 if self.shadowing in ("correlated", "uncorrelated") else 0.0
 
     def parameters(self) -> tuple[Parameter, ...]:
         return (

@@ -76,6 +76,11 @@ class Lobe(eqx.Module):
         """`ALBEDO_BOUND`, with the options that this lobe has."""
         return self.ALBEDO_BOUND
 
+    @property
+    def relative_error(self) -> float:
+        """What series and quadratures leave of the values, apart from rounding."""
+        return 0.0
+
     @abc.abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
         """The parameters, shape parameters and coefficients, in the order of printing."""

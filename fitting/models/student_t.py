@@ -43,6 +43,11 @@ class StudentT(Lobe):
     def linear(self) -> bool:
         return fresnel.linear(self.fresnel)
 
+    @property
+    def relative_error(self) -> float:
+        """That of the shadowing's quadrature."""
+        return 2e-8 if self.shadowing in ("correlated", "uncorrelated") else 0.0
+
     def parameters(self) -> tuple[Parameter, ...]:
         gamma = shape(
             "gamma", 2.5, (1.6, 40.0), "exponent of the tail; 2 is GGX", start=(1.8, 8.0)

@@ -47,8 +47,11 @@ FORMULAS: dict[str, str] = {
 def formula(lobe: Lobe) -> Callable | None:
     """``f(s, t, o)`` of a lobe, or None where there is none.
 
-    A lobe from outside brings its own as a function ``oracle`` in its file.
+    A lobe from outside brings its own as a function ``oracle`` in its file. There is none
+    of multiple scattering, whose albedo, a double integral, is held against 1 instead.
     """
+    if getattr(lobe, "multiple_scattering", False):
+        return None
     if lobe.NAME in FORMULAS:
         module = importlib.import_module(f"fitting.oracle.{FORMULAS[lobe.NAME]}")
         return getattr(module, lobe.NAME)

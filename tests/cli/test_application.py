@@ -10,7 +10,7 @@ import pytest
 
 from fitting.sample import sample_path
 
-COMMANDS = ("fit", "info", "score", "convert", "models", "formats", "doctor")
+COMMANDS = ("fit", "info", "score", "convert", "models", "stress", "formats", "doctor")
 HEAVY = ("jax", "equinox", "optimistix", "colour", "matplotlib")
 SHOW_MODULES = (
     "import json, sys; from fitting.cli import main; code = main(sys.argv[1:]); "

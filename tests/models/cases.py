@@ -1,92 +1,65 @@
-"""Every registered lobe with every combination of its options, and points to try it at."""
+"""Every registered lobe with its options, and how thoroughly each is tested when."""
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
-import jax
-import jax.numpy as jnp
-import numpy as np
+import pytest
 
-from fitting.geometry import Geometry, from_angles
+from fitting.expression import OPTIONS
 from fitting.models import LOBES, Lobe, lobe_class
-from fitting.parameters import Parameter
-
-OPTIONS = {"anisotropic": (False, True), "fresnel": ("schlick", "dielectric")}
-
-WIDTHS = (1e-4, 1e-3, 1e-2, 0.1, 0.5, 1.0, 1.5)
-THETAS_DEG = (0.0, 1e-6, 1e-3, 45.0, 89.0, 89.9, 90 - 1e-6, 90.0)
+from fitting.stress import variants
+from fitting.stress.variants import Variant
 
 
 @dataclass(frozen=True)
 class Case:
-    """A lobe class with a choice of options."""
+    """A lobe class with a choice of options by field."""
 
     name: str
-    options: tuple[tuple[str, object], ...]
-
-    def __str__(self) -> str:
-        words = [
-            "aniso" if v is True else "iso" if v is False else v for _, v in self.options
-        ]
-        return f"{self.name}({','.join(map(str, words))})" if words else self.name
+    options: tuple[tuple[str, object], ...] = ()
 
     @property
     def lobe(self) -> Lobe:
-        return lobe_class(self.name)(**dict(self.options))
-
-    @property
-    def shapes(self) -> tuple[Parameter, ...]:
-        return tuple(p for p in self.lobe.parameters() if not p.coefficient)
-
-    @property
-    def anisotropic(self) -> bool:
-        return ("anisotropic", True) in self.options
+        options: dict[str, Any] = dict(self.options)
+        return lobe_class(self.name)(**options)
 
 
-def _cases() -> list[Case]:
-    cases: list[Case] = []
+def _first_of_their_kind() -> Iterator[str]:
+    """What the default run takes: every lobe, every anisotropic one, and every other
+    option on the first lobe that has it, since its physics is shared."""
+    seen: set[str] = set()
     for name in LOBES:
-        fields = [f for f in OPTIONS if f in lobe_class(name).__dataclass_fields__]
-        for values in itertools.product(*(OPTIONS[f] for f in fields)):
-            cases.append(Case(name, tuple(zip(fields, values, strict=True))))
-    return cases
+        for v in variants.of_name(name):
+            option = v.name[len(name) + 1 : -1]
+            if option in ("", "aniso") or option not in seen or option not in OPTIONS:
+                yield v.name
+            seen.add(option)
 
 
-CASES = _cases()
+VARIANTS: list[Variant] = [v for n in LOBES for v in variants.of_name(n)]
+COMBINED: list[Variant] = [
+    v
+    for n in LOBES
+    for v in variants.of_name(n, combined=True)
+    if v.name not in {w.name for w in VARIANTS}
+]
+QUICK: list[Variant] = [v for v in VARIANTS if v.name in set(_first_of_their_kind())]
+DEFAULTS: list[Variant] = [v for v in VARIANTS if v.name in LOBES]
 
 
-def extreme_values(p: Parameter) -> tuple[float, ...]:
-    """Values over the closed support of a shape parameter, ends included."""
-    low, high = p.support
-    if p.name.startswith("alpha"):
-        return WIDTHS
-    if p.scale == "periodic":
-        return (low, 0.3 * high)
-    if p.scale == "log":
-        return tuple(np.geomspace(low, high, 5))
-    return tuple(low + (high - low) * np.array([0.0, 0.3, 1.0]))
+def each(of: list[Variant]) -> pytest.MarkDecorator:
+    """Parametrises a test over variants."""
+    return pytest.mark.parametrize("variant", of, ids=str)
 
 
-def extreme_shapes(case: Case) -> dict[str, np.ndarray]:
-    """All combinations of the extreme values, one array per parameter."""
-    grid = list(itertools.product(*(extreme_values(p) for p in case.shapes)))
-    columns = np.array(grid, dtype=np.float64).reshape(len(grid), len(case.shapes)).T
-    return {p.name: c for p, c in zip(case.shapes, columns, strict=True)}
-
-
-def default_shape(case: Case) -> dict[str, jax.Array]:
-    return {p.name: jnp.asarray(p.default) for p in case.shapes}
-
-
-def extreme_geometry() -> Geometry:
-    """Normal to grazing for both directions; retro, mirror, oblique and nearly opposite."""
-    theta = np.radians(THETAS_DEG)
-    ti, tr, dphi = np.meshgrid(theta, theta, np.radians([0.0, 40.0, 90.0, 180.0]))
-    return from_angles(ti.ravel(), 0.3, tr.ravel(), 0.3 + dphi.ravel())
-
-
-def on_device(geometry: Geometry) -> Geometry:
-    """The geometry as JAX arrays of the current precision."""
-    return jax.tree.map(jnp.asarray, geometry)
+def default_and_slow(of: list[Variant]) -> pytest.MarkDecorator:
+    """All variants, of which the default run takes some and the slow one the others."""
+    quick = {v.name for v in of}
+    marked = [
+        pytest.param(v, marks=() if v.name in quick else pytest.mark.slow, id=str(v))
+        for v in VARIANTS
+    ]
+    return pytest.mark.parametrize("variant", marked)

@@ -1,0 +1,249 @@
+"""Where lobes are exercised: the closed domain, with its extremes over-represented.
+
+The polar angles go from exactly 0 to exactly 90 degrees, the shape parameters to both ends
+of their supports. Pairs are drawn from strata: extreme angles, anywhere, the mirror and the
+way back exactly and within the lobe's own width, opposite grazing pairs, normal incidence;
+a third of them at azimuth zero, where components vanish. The seed is fixed by the name.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from fitting.geometry import Geometry, from_angles
+from fitting.models import AxisPeak, SlopeWidths
+from fitting.parameters import Parameter
+from fitting.stress.variants import Variant
+
+HORIZON = 0.5 * np.pi
+THETAS_DEG = (0.0, 1e-6, 1e-3, 45.0, 89.0, 89.9, 90 - 1e-6, 90.0)
+WIDTHS = (1e-4, 1e-3, 1e-2, 0.1, 0.5, 1.0, 1.5)
+BLOCK = 250
+_BROAD = 0.2
+
+
+@dataclass(frozen=True)
+class Points:
+    """Directions, rad, and shape parameters by name, all ``(n,)`` in float64."""
+
+    theta_i: np.ndarray
+    phi_i: np.ndarray
+    theta_o: np.ndarray
+    phi_o: np.ndarray
+    shape: dict[str, np.ndarray]
+
+    @property
+    def geometry(self) -> Geometry:
+        """The directions as components."""
+        return from_angles(self.theta_i, self.phi_i, self.theta_o, self.phi_o)
+
+    def below(self, distance: float) -> Points:
+        """The same with no direction nearer to the horizon than this angle, rad."""
+        most = HORIZON - distance
+        return Points(
+            np.minimum(self.theta_i, most),
+            self.phi_i,
+            np.minimum(self.theta_o, most),
+            self.phi_o,
+            self.shape,
+        )
+
+    def chosen(self, index: np.ndarray | slice) -> Points:
+        """Some of them."""
+        return Points(
+            self.theta_i[index],
+            self.phi_i[index],
+            self.theta_o[index],
+            self.phi_o[index],
+            {n: v[index] for n, v in self.shape.items()},
+        )
+
+    def words(self, k: int) -> str:
+        """One point for people: ``alpha 0.001, source at 45 deg, ...``."""
+        apart = (self.phi_o[k] - self.phi_i[k] + np.pi) % (2 * np.pi) - np.pi
+        values = [f"{n} {v[k]:.4g}" for n, v in self.shape.items()]
+        return ", ".join(
+            [
+                *values,
+                f"source {_degrees(self.theta_i[k])}",
+                f"detector {_degrees(self.theta_o[k])} deg from the normal",
+                f"azimuths {abs(np.degrees(apart)):.4g} deg apart",
+            ]
+        )
+
+
+def stratified(variant: Variant, count: int, *, salt: str = "") -> Points:
+    """As many points of a variant, always the same ones: fewer points are the first of
+    more."""
+    parts = []
+    for block in range(max(-(-count // BLOCK), 1)):
+        seed = (zlib.crc32(f"{variant}{salt}".encode()), block)
+        rng = np.random.default_rng(seed)
+        shape = {p.name: _values(p, rng, BLOCK) for p in variant.shapes}
+        parts.append(Points(*_directions(_width(variant, shape), rng, BLOCK), shape))
+    return joined(*parts).chosen(slice(count))
+
+
+def product_of_extremes(variant: Variant, count: int) -> Points:
+    """Extreme shapes by extreme directions: every combination of the directions with
+    shapes drawn from all combinations of extreme values, until there are ``count``."""
+    rng = np.random.default_rng(zlib.crc32(f"{variant} extremes".encode()))
+    theta = np.radians(THETAS_DEG)
+    grid = np.meshgrid(theta, theta, np.radians([0.0, 40.0, 90.0, 180.0]), indexing="ij")
+    ti, to, apart = (g.ravel() for g in grid)
+    order = np.concatenate([rng.permutation(ti.size) for _ in range(-(-count // ti.size))])[
+        :count
+    ]
+    phi = rng.choice([0.0, 0.3], count)
+    shape = {p.name: rng.choice(extremes(p), count) for p in variant.shapes}
+    return Points(ti[order], phi, to[order], phi + apart[order], shape)
+
+
+def joined(*parts: Points) -> Points:
+    """All points of several sets."""
+
+    def both(field: str) -> np.ndarray:
+        return np.concatenate([getattr(p, field) for p in parts])
+
+    names = parts[0].shape
+    return Points(
+        both("theta_i"),
+        both("phi_i"),
+        both("theta_o"),
+        both("phi_o"),
+        {n: np.concatenate([p.shape[n] for p in parts]) for n in names},
+    )
+
+
+def shuffled(points: Points) -> Points:
+    """The same in another order, so that the first ones are some of every kind."""
+    count = np.size(points.theta_i)
+    return points.chosen(np.random.default_rng(count).permutation(count))
+
+
+def interior(variant: Variant, count: int, *, salt: str = "") -> Points:
+    """Shape parameters inside their supports, directions up to 80 degrees, at random."""
+    rng = np.random.default_rng(zlib.crc32(f"{variant} interior{salt}".encode()))
+    shape = {
+        p.name: _spread(p, rng.uniform(0.1, 0.9, count), p.start) for p in variant.shapes
+    }
+    ti, to = rng.uniform(0.02, np.radians(80.0), (2, count))
+    pi, po = rng.uniform(0.0, 2 * np.pi, (2, count))
+    return Points(ti, pi, to, po, shape)
+
+
+def default_shape(variant: Variant, count: int) -> dict[str, np.ndarray]:
+    """The default values, one for each of the points."""
+    return {p.name: np.full(count, p.default) for p in variant.shapes}
+
+
+def extremes(p: Parameter) -> np.ndarray:
+    """Values over the closed support of a shape parameter, ends included."""
+    low, high = p.support
+    if p.name.startswith("alpha"):
+        inside = [w for w in WIDTHS if low < w < high]
+        return np.array([low, *inside, high])
+    if p.scale == "periodic":
+        return np.array([low, 0.3 * high])
+    if p.scale == "log":
+        return np.minimum(np.geomspace(low, high, 5), high)
+    return low + (high - low) * np.array([0.0, 1e-4, 0.3, 0.9999, 1.0])
+
+
+def _values(p: Parameter, rng: np.random.Generator, count: int) -> np.ndarray:
+    at_random = _spread(p, rng.random(count), p.support)
+    usual = _spread(p, rng.random(count), p.start)
+    share = rng.random(count)
+    edge = rng.choice(extremes(p), count)
+    return np.where(share < 0.4, edge, np.where(share < 0.7, at_random, usual))
+
+
+def _spread(p: Parameter, share: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    low, high = ends
+    if p.scale == "log":
+        inside = low * np.exp(np.log(high / low) * share)
+    else:
+        inside = low + (high - low) * share
+    return np.clip(inside, low, high)
+
+
+def _width(variant: Variant, shape: dict[str, np.ndarray]) -> np.ndarray:
+    """How wide the peak is, as an angle of the half vector, rad."""
+    count = len(next(iter(shape.values()), np.zeros(1)))
+    with jax.enable_x64(True):
+        own = {n: jnp.asarray(v) for n, v in shape.items()}
+        peak = jax.vmap(variant.lobe.peak)(own) if own else variant.lobe.peak(own)
+    if isinstance(peak, SlopeWidths):
+        width = np.minimum(peak.alpha_x, peak.alpha_y)
+    elif isinstance(peak, AxisPeak):
+        width = np.sqrt(2.0 / (np.asarray(peak.exponent) + 2.0))
+    else:
+        width = np.asarray(_BROAD)
+    return np.broadcast_to(np.clip(width, 1e-6, 1.5), (count,))
+
+
+def _directions(
+    width: np.ndarray, rng: np.random.Generator, count: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    width = np.broadcast_to(width, (count,))
+    extreme = np.radians(THETAS_DEG)
+    anywhere_i, anywhere_o = rng.uniform(0, HORIZON, (2, count))
+    ti = np.where(rng.random(count) < 0.5, rng.choice(extreme, count), anywhere_i)
+    to = np.where(rng.random(count) < 0.5, rng.choice(extreme, count), anywhere_o)
+    apart = np.where(
+        rng.random(count) < 0.5,
+        rng.choice([0.0, 0.5, 0.5 * np.pi, 2.6, np.pi], count),
+        rng.uniform(0, 2 * np.pi, count),
+    )
+    kind = rng.random(count)
+    # The mirror direction or the way back, exactly and nearly on several scales.
+    exact = rng.choice([np.pi, 0.0], count)
+    off = rng.choice([0.0, 1e-7, 1e-4, 1e-2], count)
+    near = kind < 0.2
+    to = np.where(near, np.minimum(ti + off, HORIZON), to)
+    apart = np.where(near, exact + rng.choice([0.0, 1e-5, 1e-2], count), apart)
+    # Within some widths of the peak.
+    inside = (kind >= 0.2) & (kind < 0.5)
+    slope = width * rng.choice([1e-3, 0.1, 0.5, 1.0, 2.0, 4.0], count)
+    theta_p, phi_p = _mirrored(ti, slope, rng.uniform(0, 2 * np.pi, count))
+    to = np.where(inside, np.minimum(theta_p, HORIZON), to)
+    apart = np.where(inside, phi_p + np.where(exact == 0.0, np.pi, 0.0), apart)
+    # Nearly opposite grazing directions.
+    opposite = (kind >= 0.5) & (kind < 0.6)
+    small = 10.0 ** rng.uniform(-9, -1, (3, count)) * (rng.random((3, count)) < 0.8)
+    ti = np.where(opposite, HORIZON - small[0], ti)
+    to = np.where(opposite, HORIZON - small[1], to)
+    apart = np.where(opposite, np.pi + small[2], apart)
+    ti = np.where((kind >= 0.6) & (kind < 0.65), 0.0, ti)
+    phi = np.where(rng.random(count) < 1 / 3, 0.0, rng.uniform(0, 2 * np.pi, count))
+    swap = rng.random(count) < 0.5
+    return (
+        np.where(swap, to, ti),
+        np.where(swap, phi + apart, phi),
+        np.where(swap, ti, to),
+        np.where(swap, phi, phi + apart),
+    )
+
+
+def _mirrored(
+    theta: np.ndarray, slope: np.ndarray, azimuth: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Reflection of the direction ``(theta, 0)`` at facets of a slope."""
+    x, z = np.sin(theta), np.cos(theta)
+    hz = 1 / np.sqrt(1 + slope**2)
+    hx, hy = slope * hz * np.cos(azimuth), slope * hz * np.sin(azimuth)
+    d = x * hx + z * hz
+    ox, oy, oz = 2 * d * hx - x, 2 * d * hy, 2 * d * hz - z
+    return np.arctan2(np.hypot(ox, oy), oz), np.arctan2(oy, ox)
+
+
+def _degrees(theta: float) -> str:
+    degrees = np.degrees(theta)
+    if 0 < 90 - degrees < 1e-3:
+        return f"90 - {90 - degrees:.2g}"
+    return f"{degrees:.4g}"
