@@ -21,7 +21,7 @@ from fitting.result import FitResult
 DEFAULT_MODELS = (
     "lambert + ggx",
     "lambert + ward",
-    "lambert + blinn_phong",
+    "lambert + ggx(bare)",
     "lambert + 2*ggx",
     "lambert + ggx + blinn_phong",
 )

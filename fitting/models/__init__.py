@@ -10,32 +10,38 @@ from fitting.models.lobe import AxisPeak, Lobe, Peak, Shape, SlopeWidths
 __all__ = ["LOBES", "AxisPeak", "Lobe", "Peak", "Shape", "SlopeWidths", "lobe_class"]
 
 LOBES: dict[str, str] = {
+    # Matt surfaces.
     "lambert": "Lambert",
     "oren_nayar": "OrenNayar",
     "eon": "EON",
+    "burley": "Burley",
+    "minnaert": "Minnaert",
+    "interfaced_lambert": "InterfacedLambert",
+    "ashikhmin_shirley_diffuse": "AshikhminShirleyDiffuse",
+    # Facets around the half vector.
     "ggx": "GGX",
     "beckmann": "Beckmann",
     "student_t": "StudentT",
     "gtr": "GTR",
+    "sgd": "SGD",
     "ward": "Ward",
     "blinn_phong": "BlinnPhong",
-    "sgd": "SGD",
+    "ashikhmin_shirley": "AshikhminShirley",
+    # Lobes around a direction.
     "phong": "Phong",
     "lafortune": "Lafortune",
-    "ashikhmin_shirley": "AshikhminShirley",
-    "ashikhmin_shirley_diffuse": "AshikhminShirleyDiffuse",
-    "minnaert": "Minnaert",
-    "burley": "Burley",
-    "interfaced_lambert": "InterfacedLambert",
-    "disney": "Disney",
-    "openpbr": "OpenPBR",
+    # Scatter of polished and glossy surfaces.
     "abg": "ABg",
     "harvey_shack": "HarveyShack",
     "abc": "ABC",
     "abc_smooth": "ABCSmooth",
-    "rtls": "RTLS",
+    # Soils, vegetation, planets.
     "rpv": "RPV",
+    "rtls": "RTLS",
     "hapke": "Hapke",
+    # Materials of renderers, to convert a fit to.
+    "disney": "Disney",
+    "openpbr": "OpenPBR",
 }
 
 

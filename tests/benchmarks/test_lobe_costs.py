@@ -1,0 +1,64 @@
+"""What lobes cost relative to each other, to numpy and to themselves without a table.
+
+    python -m pytest tests/benchmarks -m slow -n 0 -s
+
+All as ratios within one run.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import pytest
+import synthetic
+
+import lobe_costs
+from fitting import FitOptions, Model
+from fitting.problem import prepare, select_rows
+from fitting.reduced import evaluate
+
+pytestmark = pytest.mark.slow
+
+
+def test_compiled_against_numpy(line):
+    """The same source: by XLA in one pass, by numpy an array at a time."""
+    unit = lobe_costs.cost("lambert").value["f32"]
+    line("| lobe | f32 | f64 | Jacobian f32 | f64 | numpy / compiled | flops | trans. |")
+    for name in ("ggx", "ggx(ms)", "ward", "abg"):
+        own = lobe_costs.cost(name)
+        line(lobe_costs.row(name, own, unit))
+        assert own.numpy > own.value["f64"]
+        assert own.value["f32"] < own.value["f64"]
+
+
+@pytest.mark.parametrize(("expression", "least"), [("beckmann", 1.1), ("student_t", 8.0)])
+def test_one_pass_with_the_table_of_polar_angles(line, expression: str, least: float):
+    """A pass over 100,000 rows of some tens of polar angles."""
+    with jax.enable_x64(True):
+        angles = synthetic.directions(rings=80, azimuths=250)
+        rows = select_rows(synthetic.measurement(expression, {}, angles=angles), 85.0)
+        problem = prepare(rows, Model(expression), FitOptions(objective="l2"))
+        plain = dataclasses.replace(problem, angles=None, angle_rows=None)
+        k, m = problem.unknowns.n_shape, problem.unknowns.n_coefficients
+        point = jnp.zeros(k), jnp.ones((1, m)), jnp.asarray(False)
+        compiled = jax.jit(evaluate)
+
+        def time_of(p) -> float:
+            jax.block_until_ready(compiled(p, *point))
+            return lobe_costs.seconds(lambda: jax.block_until_ready(compiled(p, *point)))
+
+        ratio = time_of(plain) / time_of(problem)
+    line(f"{expression}, {len(rows.index)} rows: {ratio:.1f} times faster with the table")
+    assert ratio > least
+
+
+def test_the_table_of_the_readme_names_every_lobe():
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    table = re.search(r"<!-- cost -->\n(.*?)\n<!-- /cost -->", readme, re.S)
+    assert table
+    names = [row.split("|")[1].strip(" `") for row in table[1].splitlines()[2:]]
+    assert names == lobe_costs.variants()
