@@ -8,13 +8,21 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from fitting.parameters import to_real_line
+from fitting import sampling
+from fitting.models.lobe import AxisPeak, Lobe
+from fitting.parameters import Parameter, to_real_line
 from fitting.reduced import Problem
 from fitting.solve import scan
 
 _SCAN_ROWS = 2048
+_BRIGHT_ROWS = 512
 _SCAN_SIZES = {1: 24, 2: 64, 3: 96}
 _APART = 0.7
+# Peaks narrower than this may be narrower than any lobe's usual range of starts.
+_NARROW = 0.05
+_NARROW_POINTS = 32
+_WIDTH_FACTORS = (0.5, 1.0, 2.0, 4.0)
+_WIDTH_NODES = 256
 
 
 def candidates(problem: Problem) -> np.ndarray:
@@ -78,7 +86,10 @@ def _equal_lobes(names: list[str]) -> list[list[list[int]]]:
 def best_starts(problem: Problem, count: int) -> tuple[np.ndarray, np.ndarray]:
     """The ``count`` best distinct points of the scan, with their coefficients."""
     points = candidates(problem)
-    cost, x = scan(_thinned(problem), jnp.asarray(points))
+    narrow = narrow_candidates(problem, points)
+    if narrow.size:
+        points = np.concatenate([points, narrow])
+    cost, x = scan(thinned(problem), jnp.asarray(points))
     cost = np.where(np.isfinite(cost), np.asarray(cost), np.inf)
     chosen: list[int] = []
     for i in np.argsort(cost, kind="stable"):
@@ -90,12 +101,85 @@ def best_starts(problem: Problem, count: int) -> tuple[np.ndarray, np.ndarray]:
     return points[chosen], np.asarray(x)[chosen]
 
 
-def _thinned(problem: Problem) -> Problem:
-    """At most `_SCAN_ROWS` rows, drawn with a fixed seed: enough to find the basin."""
+def narrow_candidates(problem: Problem, points: np.ndarray) -> np.ndarray:
+    """More points ``(p, k)`` for data with a peak narrower than where the lobes start.
+
+    Copies of the first points, each with the width of one lobe about as the data show it.
+    None for ordinary data.
+    """
+    model, free = problem.model, problem.unknowns.free_shape
+    lower, upper = np.asarray(problem.unknowns.lower), np.asarray(problem.unknowns.upper)
+    lobes: list[list[tuple[int, np.ndarray]]] = []
+    for label, lobe in zip(model.labels, model.lobes, strict=True):
+        shape = {p.name: p.default for p in lobe.parameters() if not p.coefficient}
+        own = [n for n in shape if f"{label}.{n}" in free]
+        width = sampling.visible_width(problem, lobe, shape) if own else None
+        if width is None or width > _NARROW:
+            continue
+        columns = []
+        for name in sampling.width_parameters(lobe, shape, own):
+            (p,) = (p for p in lobe.parameters() if p.name == name)
+            j = free.index(f"{label}.{name}")
+            low, high = float(lower[j]), float(upper[j])
+            values = _values_of_widths(lobe, shape, p, (low, high), width)
+            if np.all((p.start[0] <= values) & (values <= p.start[1])):
+                continue
+            columns.append(
+                (j, np.array([to_real_line(p.scale, v, low, high) for v in values]))
+            )
+        if columns:
+            lobes.append(columns)
+    if not lobes:
+        return points[:0]
+    more = np.resize(points, (_NARROW_POINTS, points.shape[1]))
+    for i in range(_NARROW_POINTS):
+        for j, values in lobes[i // len(_WIDTH_FACTORS) % len(lobes)]:
+            more[i, j] = values[i % len(_WIDTH_FACTORS)]
+    return more
+
+
+def _values_of_widths(
+    lobe: Lobe,
+    shape: dict[str, float],
+    parameter: Parameter,
+    ends: tuple[float, float],
+    width: float,
+) -> np.ndarray:
+    """Values of a parameter with which a lobe is about as wide as the data show it."""
+    share = np.linspace(0.0, 1.0, _WIDTH_NODES)
+    nodes = ends[0] + (ends[1] - ends[0]) * share
+    if parameter.scale == "log":
+        nodes = ends[0] * (ends[1] / ends[0]) ** share
+    fixed = {n: jnp.asarray(v) for n, v in shape.items()}
+    peak = jax.vmap(lambda v: lobe.peak({**fixed, parameter.name: v}))(jnp.asarray(nodes))
+    if peak is None:
+        return np.full(len(_WIDTH_FACTORS), shape[parameter.name])
+    if isinstance(peak, AxisPeak):
+        sizes = np.sqrt(2.0 / np.maximum(np.asarray(peak.exponent), 1e-3))
+    else:
+        x, y = np.asarray(peak.alpha_x), np.asarray(peak.alpha_y)
+        sizes = x if np.ptp(x) > 0 else y
+    wanted = np.log(width * np.array(_WIDTH_FACTORS))
+    return nodes[np.argmin(np.abs(np.log(sizes)[:, None] - wanted), axis=0)]
+
+
+def thinned(problem: Problem) -> Problem:
+    """At most `_SCAN_ROWS` rows, drawn with a fixed seed: enough to find the basin.
+
+    The brightest rows are all there, lest a narrow peak be missed; each of the others
+    stands for as many as were left out.
+    """
     n = problem.kappa.shape[0]
     if n <= _SCAN_ROWS:
         return problem
-    rows = np.sort(np.random.default_rng(0).permutation(n)[:_SCAN_ROWS])
+    used = np.asarray(problem.weight) > 0
+    value = np.max(np.where(used, np.asarray(problem.linear_target), -np.inf), axis=0)
+    order = np.argsort(-value, kind="stable")
+    drawn = _SCAN_ROWS - _BRIGHT_ROWS
+    others = np.random.default_rng(0).permutation(order[_BRIGHT_ROWS:])[:drawn]
+    rows = np.concatenate([order[:_BRIGHT_ROWS], others])
+    stands_for = np.ones(_SCAN_ROWS)
+    stands_for[_BRIGHT_ROWS:] = np.sqrt((n - _BRIGHT_ROWS) / drawn)
 
     def take(a):
         return a[..., rows]
@@ -107,6 +191,10 @@ def _thinned(problem: Problem) -> Problem:
         angle_rows=jax.tree.map(take, problem.angle_rows),
         **{
             name: take(getattr(problem, name))
-            for name in ("kappa", "weight", "target", "linear_target", "linear_weight")
+            for name in ("kappa", "target", "linear_target")
+        },
+        **{
+            name: take(getattr(problem, name)) * stands_for
+            for name in ("weight", "linear_weight")
         },
     )

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 
 import jax
 import numpy as np
 
+from fitting import identifiability
 from fitting.model import Model
 from fitting.parameters import slope_of_value
 from fitting.reduced import Problem
@@ -15,7 +15,6 @@ from fitting.result import Correlations, ParameterResult, finite_or_none
 from fitting.solve import Solution
 from fitting.uncertainty import Covariance
 
-_STRONG = 0.95
 _AT_BOUND_SHARE = 5e-4
 
 
@@ -190,26 +189,17 @@ def parameters(
     correlations = Correlations(
         names, [[[finite_or_none(v) for v in row] for row in block] for block in blocks]
     )
-    words = _missing_values(errors, len(free_shape), len(free_linear), channels)
-    return table, correlations, words + _identifiability(table, names, blocks, channels)
-
-
-def _missing_values(
-    errors: list[_Errors], n_shape: int, n_linear: int, channels: list[str]
-) -> list[str]:
-    values = np.concatenate([e.values for e in errors])
-    out = [
-        f"{channels[c]} has no valid value: its parameters mean nothing"
-        for c in np.flatnonzero(values == 0)
-    ]
-    for e in errors:
-        unknowns = e.values.size * n_linear + n_shape
-        if 0 < e.values.sum() <= unknowns:
-            out.append(
-                f"{int(e.values.sum())} values for {unknowns} free parameters: nothing is "
-                "left over to judge the errors by"
-            )
-    return out
+    words = identifiability.of_data(
+        [f.problem for f in found],
+        [f.solution for f in found],
+        [f.values() for f in found],
+        [e.values for e in errors],
+        [c.penalty for c in covariances],
+        channels,
+    )
+    words += identifiability.of_parameters(table, names, blocks, channels)
+    determined = "every free parameter is determined by the data on its own"
+    return table, correlations, words or [determined]
 
 
 def _intervals(
@@ -222,44 +212,3 @@ def _intervals(
         (float(v - h), float(v + h)) if np.isfinite(h) else None
         for v, h in zip(value, half, strict=True)
     ]
-
-
-def _identifiability(
-    table: list[ParameterResult], names: list[str], blocks: np.ndarray, channels: list[str]
-) -> list[str]:
-    """Sentences on what the data leave open."""
-    out: list[str] = []
-    for (i, a), (j, b) in itertools.combinations(enumerate(names), 2):
-        pair = blocks[:, i, j]
-        strong = np.flatnonzero(np.nan_to_num(np.abs(pair)) > _STRONG)
-        if not strong.size:
-            continue
-        worst = strong[np.argmax(np.abs(pair[strong]))]
-        known = "sum" if pair[worst] < 0 else "difference"
-        where = f"in {strong.size} of {len(channels)} channels" if len(channels) > 1 else ""
-        out.append(
-            f"{a} and {b} trade off {where}".rstrip()
-            + f" (correlation {pair[worst]:+.3f} at {channels[worst]}): "
-            f"their scaled {known} is known, not their split"
-        )
-    for p in table:
-        if p.fixed or p.tied_to:
-            continue
-        pairs = list(zip(p.value, p.standard_uncertainty, strict=True))
-        loose = sum(s is not None and s > abs(v) for v, s in pairs)
-        bound = sum(p.at_bound)
-        unknown = sum(s is None for s in p.standard_uncertainty) - bound
-        of = f" in {{}} of {len(pairs)} channels" if len(pairs) > 1 else ""
-        if bound:
-            out.append(f"{p.name} is at a bound{of.format(bound)}")
-        if unknown > 0:
-            out.append(
-                f"{p.name} has no uncertainty{of.format(unknown)}: the data do not "
-                "determine it at all"
-            )
-        if loose:
-            out.append(
-                f"{p.name} is not determined{of.format(loose)}: its standard uncertainty "
-                "exceeds its value"
-            )
-    return out or ["every free parameter is determined by the data on its own"]

@@ -37,12 +37,14 @@ class Covariance(NamedTuple):
     """Covariance of ``[x of channel 1, x of channel 2, ..., u]`` and active bounds.
 
     ``freedom`` is the effective number of degrees of freedom of each variance, small where
-    a few rows decide about a parameter; intervals use Student's t with it.
+    a few rows decide about a parameter; intervals use Student's t with it. ``penalty`` is
+    the share of the penalties in the cost.
     """
 
     matrix: np.ndarray
     freedom: np.ndarray
     active: np.ndarray
+    penalty: float = 0.0
 
 
 def covariance(problem: Problem, end: Solution) -> Covariance:
@@ -71,7 +73,9 @@ def covariance(problem: Problem, end: Solution) -> Covariance:
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         freedom = np.where(second > 0, np.maximum(first**2 / second, 1.0), np.inf)
-    return Covariance(matrix, freedom, active)
+    whole = float(end.cost)
+    penalty = max(1.0 - float(b.cost) / whole, 0.0) if whole > 0 else 0.0
+    return Covariance(matrix, freedom, active, penalty)
 
 
 @eqx.filter_jit

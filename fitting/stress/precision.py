@@ -34,7 +34,7 @@ from fitting.stress.variants import Variant
 
 CONDITION = 16.0
 # Lobes may call zero what is next to the smallest normal number: its power of 0.9 at most.
-_ROOM = 0.85
+_ROOM = 0.8
 # Where rounding the inputs changes the value by more, it is not determined by them.
 _UNDETERMINED = 0.01
 # Below this error a condition number would change nothing, and costs time.
@@ -43,7 +43,7 @@ ULPS = 32.0
 PER_CONDITION = 2.0
 # The papers' formulas have a pole with a finite limit where a direction is horizontal.
 NEAREST_TO_HORIZON = 1e-11
-_WORTH_PROCESSES = 8000
+_WORTH_PROCESSES = 1500
 _SMALL = 20
 
 Progress = Callable[[int], None]

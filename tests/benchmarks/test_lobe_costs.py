@@ -13,10 +13,10 @@ from pathlib import Path
 
 import jax
 import jax.numpy as jnp
+import lobe_costs
 import pytest
 import synthetic
 
-import lobe_costs
 from fitting import FitOptions, Model
 from fitting.problem import prepare, select_rows
 from fitting.reduced import evaluate
