@@ -44,6 +44,8 @@ from fitting.validation import cross_validation
 Progress = Callable[[str], None]
 _SAME_COST = 1e-6
 _ROUNDING = 1e-16
+_NOTICEABLY_COSTLIER = 1.001
+_FAR_COSTLIER = 1e4
 _DENSE_NODES = 32
 _NOISE_ROUNDS = 2
 
@@ -228,8 +230,12 @@ def _solver(found: list[Found], objective: str) -> Solver:
         sentence = (
             f"converged in {after}; {agreeing} of {n_starts} starts reach the best minimum"
         )
-        if others:
+        if others and min(others) >= _FAR_COSTLIER:
+            sentence += ", the next one costs far more"
+        elif others and min(others) >= _NOTICEABLY_COSTLIER:
             sentence += f", the next one costs {min(others):.4g} times as much"
+        elif others:
+            sentence += ", the next one costs hardly more"
     return Solver(
         sentence=f"{sentence} ({objective})",
         converged=converged,
