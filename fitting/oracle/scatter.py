@@ -40,6 +40,7 @@ def abc_smooth(s, t, o):
     """Low et al. 2012, smooth surface; F at the half of ``xy(wi) - xy(wo)``."""
     apart = t.phi_i - t.phi_o
     si, so = mp.sin(t.theta_i), mp.sin(t.theta_o)
-    half = mp.sqrt(si**2 + so**2 - 2 * si * so * mp.cos(apart)) / 2
-    f = dielectric_reflectance(mp.asin(min(half, mp.mpf(1))), s["eta"])
+    distance2 = max(si**2 + so**2 - 2 * si * so * mp.cos(apart), mp.mpf(0))
+    half = min(mp.sqrt(distance2) / 2, mp.mpf(1))
+    f = dielectric_reflectance(mp.asin(half), s["eta"])
     return (f / (1 + s["b"] * _from_mirror(t) ** 2) ** s["c"],)

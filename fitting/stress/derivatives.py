@@ -29,7 +29,7 @@ DIFFERENCES = 1e-6
 _STEP = mp.mpf(10) ** -15
 _RICHARDSON = 1e-3
 # A formula that is a quadrature itself has no differences of 1e-15.
-_SMALL = 1e-6
+_SMALL = 1e-7
 
 
 def correct(
