@@ -12,7 +12,7 @@ from data_formats import Measurement
 from fitting import FitOptions, judge
 from fitting.geometry import from_angles
 from fitting.model import Model
-from fitting.models import LOBES, lobe_class
+from fitting.models import lobe_class
 from fitting.predict import predict_geometry
 from fitting.problem import select_rows
 from fitting.result import FitResult
@@ -26,18 +26,6 @@ ALONE = {
 }
 _TWO = np.array([1.0, 0.6])
 _ALBEDO = 0.3 * _TWO
-
-
-def importable() -> list[str]:
-    """The registered lobes whose files are there."""
-    out = []
-    for name in LOBES:
-        try:
-            lobe_class(name)
-        except ImportError:
-            continue
-        out.append(name)
-    return out
 
 
 def fine_directions(theta_i_deg=synthetic.THETA_I_DEG) -> tuple[np.ndarray, ...]:

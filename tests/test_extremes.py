@@ -12,6 +12,7 @@ import synthetic
 
 import data_formats
 from fitting import fit
+from fitting.models import LOBES
 
 QUICK = ("ggx", "phong", "abg")
 # One of every kind for CI; the others with -m full.
@@ -32,7 +33,7 @@ def fitted(measurement, expression, **settings):
     return fit(measurement, expression, cross_validate=False, energy=0.0, **settings)
 
 
-@pytest.mark.parametrize("name", lobes(extremes.importable()))
+@pytest.mark.parametrize("name", lobes(LOBES))
 def test_every_width_is_found_or_said_to_be_open(name):
     for width, noise in itertools.product(extremes.WIDTHS, (0.0, 0.01)):
         expression, truth = extremes.truth_of(name, width)

@@ -8,7 +8,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import synthetic
 
+from fitting import fit
 from fitting.albedo import albedo_basis
 from fitting.geometry import from_angles
 from fitting.models import lobe_class
@@ -194,3 +196,14 @@ def test_error_of_the_quadrature(name: str, shape: dict[str, float]):
     mu = [0.02, 0.1, 0.3, 0.6, 1.0]
     few, most = (albedos(name, mu, nodes=n, **shape) for n in (16, 128))
     np.testing.assert_allclose(few, most, atol=5e-3 * np.max(np.abs(most)))
+
+
+def test_the_kernels_of_modis_are_fitted_in_one_step():
+    """Linear in all three coefficients: normal equations, and nothing to search for."""
+    truth = {"rtls.f_iso": 0.3, "rtls.f_vol": 0.1, "rtls.f_geo": 0.02}
+    result = fit(
+        synthetic.measurement("rtls", truth), "rtls", objective="l2", cross_validate=False
+    )
+    assert result.solver.steps == 1
+    for name, value in truth.items():
+        np.testing.assert_allclose(result.parameter(name).value, value, rtol=1e-9)
