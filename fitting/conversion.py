@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,6 +11,7 @@ import numpy as np
 from data_formats import Channel, Measurement, Provenance
 from fitting.model import Model
 from fitting.models import AxisPeak
+from fitting.models.retro import Retro
 from fitting.result import FitResult
 
 _THETA_I_DEG = (2.0, 15.0, 30.0, 45.0, 60.0, 75.0)
@@ -21,14 +24,15 @@ def resample(result: FitResult) -> Measurement:
     """Values of a fitted model over the hemisphere, for fitting another model to.
 
     ``fit(resample(result), "disney")`` converts a result. The directions are rings of the
-    detector for six angles of incidence, and half vectors on rings around the normal whose
-    slopes go from a third of the narrowest lobe's width to 1, so that a peak is sampled
-    whatever its width. For an anisotropic model the source goes around in steps of 30 deg.
+    detector for six angles of incidence, and rings around the peak of every lobe, from a
+    third of its least width on, so that it is sampled whatever its width. For an
+    anisotropic model the source goes around in steps of 30 deg.
     """
     model = Model(result.model)
     steps = np.radians(np.arange(0.0, 180.0, 30.0)) if model.anisotropic else (0.0,)
+    peaks = _peaks(model, result)
     angles = np.concatenate(
-        [_directions(t, p, _narrowest(model, result)) for t in _THETA_I_DEG for p in steps],
+        [_directions(np.radians(t), p, peaks) for t in _THETA_I_DEG for p in steps],
         axis=1,
     )
     value = result.evaluate(*angles)
@@ -49,39 +53,70 @@ def resample(result: FitResult) -> Measurement:
     )
 
 
-def _narrowest(model: Model, result: FitResult) -> float:
-    """The least slope width of the lobes, at most 1."""
-    values = {p.name: float(np.min(p.value)) for p in result.parameters}
-    widths = [1.0]
+@dataclass(frozen=True)
+class _Peak:
+    """Rings around the axis ``(c_xy x, c_xy y, z)`` of a source ``(x, y, z)``, or around
+    the normal as half vector of the detector and that axis."""
+
+    width: float
+    c_xy: float
+    half_vector: bool
+
+
+def _peaks(model: Model, result: FitResult) -> list[_Peak]:
+    """Where the lobes peak, with the least width of all channels."""
+    found: list[_Peak] = []
+    values = {p.name: np.atleast_1d(p.value) for p in result.parameters}
+    channels = max(v.size for v in values.values())
     with jax.enable_x64(True):
-        known = {n: jnp.asarray(v) for n, v in values.items()}
         for i, lobe in enumerate(model.lobes):
-            peak = lobe.peak(model.of_lobe(i, known))
-            if isinstance(peak, AxisPeak):
-                widths.append(float(np.sqrt(2.0 / (peak.exponent + 2.0))) / 2.0)
-            elif peak is not None:
-                widths.append(float(min(peak.alpha_x, peak.alpha_y)))
-    return min(widths)
+            for c in range(channels):
+                own = {n: jnp.asarray(v[min(c, v.size - 1)]) for n, v in values.items()}
+                peak = lobe.peak(model.of_lobe(i, own))
+                turn = -1.0 if isinstance(lobe, Retro) else 1.0
+                if isinstance(peak, AxisPeak):
+                    width = float(np.sqrt(2.0 / (peak.exponent + 2.0)))
+                    axis = turn * float(peak.c_xy / peak.c_z)
+                    found.append(_Peak(width, axis, half_vector=False))
+                elif peak is not None:
+                    width = float(min(peak.alpha_x, peak.alpha_y))
+                    found.append(_Peak(width, turn, half_vector=True))
+    kinds = {(p.c_xy, p.half_vector) for p in found}
+    return [
+        min((p for p in found if (p.c_xy, p.half_vector) == kind), key=lambda p: p.width)
+        for kind in sorted(kinds)
+    ]
 
 
-def _directions(theta_i_deg: float, phi_i: float, width: float) -> np.ndarray:
+def _directions(theta_i: float, phi_i: float, peaks: list[_Peak]) -> np.ndarray:
     """``theta_i, phi_i, theta_r, phi_r (4, n)`` in radians, for one source."""
-    theta_i = np.radians(theta_i_deg)
     around = np.linspace(0.0, np.pi, 9)
     ring_theta, ring_phi = np.meshgrid(
         np.radians(np.linspace(0.0, _LARGEST_THETA_DEG, _RINGS)), around
     )
-    slope, turn = np.meshgrid(np.geomspace(width / 3.0, 1.0, _AROUND_PEAK), around)
-    theta_h = np.arctan(np.concatenate([[0.0], slope.ravel()]))
-    phi_h = np.concatenate([[0.0], turn.ravel()])
-    source = np.array([np.sin(theta_i), 0.0, np.cos(theta_i)])
-    half = np.stack(
-        [np.sin(theta_h) * np.cos(phi_h), np.sin(theta_h) * np.sin(phi_h), np.cos(theta_h)]
-    )
-    x, y, z = 2.0 * (source @ half) * half - source[:, None]
-    theta_r = np.concatenate([ring_theta.ravel(), np.arctan2(np.hypot(x, y), z)])
-    phi_r = np.concatenate([ring_phi.ravel(), np.arctan2(y, x)])
+    detectors = [_unit(ring_theta.ravel(), ring_phi.ravel())]
+    for peak in peaks:
+        axis = np.array([peak.c_xy * np.sin(theta_i), 0.0, np.cos(theta_i)])
+        axis = axis / np.linalg.norm(axis)
+        slope, turn = np.meshgrid(
+            np.geomspace(min(peak.width, 1.0) / 3.0, 1.0, _AROUND_PEAK), around
+        )
+        ring = _unit(np.arctan(np.append(0.0, slope)), np.append(0.0, turn))
+        if peak.half_vector:
+            detectors.append(2.0 * (axis @ ring) * ring - axis[:, None])
+        else:
+            x, z = axis[0], axis[2]
+            tilted = np.array([[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]])
+            detectors.append(tilted @ ring)
+    x, y, z = np.concatenate(detectors, axis=1)
+    theta_r, phi_r = np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
     seen = theta_r <= np.radians(_LARGEST_THETA_DEG) + 1e-9
     theta_r, phi_r = theta_r[seen], phi_r[seen]
     ones = np.ones_like(theta_r)
     return np.stack([theta_i * ones, phi_i * ones, theta_r, phi_i + phi_r])
+
+
+def _unit(theta: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    return np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
+    )

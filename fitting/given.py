@@ -51,11 +51,16 @@ def _fixed(label: str, index: Index, declared: set[str]) -> dict[str, Value]:
             + (f"lobes with an index: {', '.join(have)}" if have else
                "write for instance 'ggx(conductor)' or 'ggx(dielectric)'")
         )  # fmt: skip
+    if names[1] in declared and not index.k_known:
+        raise ModelError(
+            f"material of {label}: {index.source} holds no k at these wavelengths, which "
+            "the option 'conductor' needs; name another page, or give a table"
+        )
     if names[1] in declared:
         return {names[0]: index.eta, names[1]: index.k}
     if np.any(index.k > _TRANSPARENT):
         raise ModelError(
             f"material of {label}: {index.source} absorbs (k up to {index.k.max():.3g}), "
-            f"but the lobe has no k: write '{label}(conductor)'"
+            "but the lobe has no k: give it the option 'conductor'"
         )
     return {names[0]: index.eta}

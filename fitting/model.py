@@ -56,7 +56,7 @@ class Model(eqx.Module):
     @property
     def anisotropic(self) -> bool:
         """Whether a lobe depends on the azimuth of the sample itself."""
-        return any(n.endswith(".angle") for n in self.parameters())
+        return any(p.scale == "periodic" for p in self.parameters().values())
 
     def n_basis(self, index: int) -> int:
         """Number of basis functions of one lobe."""
@@ -139,7 +139,14 @@ def _make_lobe(term: expr.Term) -> Lobe:
         if option not in known:
             has = f"; it has {', '.join(known)}" if known else ", nor any other"
             raise expr.ModelError(f"lobe {term.lobe!r} has no option {option!r}{has}")
-    options = dict(expr.OPTIONS[o] for o in term.options)
+    options: dict[str, object] = {}
+    for option in term.options:
+        field, value = expr.OPTIONS[option]
+        if options.setdefault(field, value) != value:
+            raise expr.ModelError(
+                f"lobe {term.lobe!r}: of {', '.join(term.options)} more than one says its "
+                f"{field.replace('_', ' ')}"
+            )
     retro = options.pop("retro", False)
     lobe = cls(**options)
     return Retro(lobe) if retro else lobe

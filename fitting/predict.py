@@ -15,8 +15,13 @@ from fitting.geometry import Geometry, from_angles
 from fitting.model import Model
 
 
-@functools.lru_cache(maxsize=64)
 def _model(expression: str) -> Model:
+    # A file with a lobe may have changed since.
+    return Model(expression) if ".py" in expression else _cached(expression)
+
+
+@functools.lru_cache(maxsize=64)
+def _cached(expression: str) -> Model:
     return Model(expression)
 
 

@@ -13,11 +13,15 @@ from fitting.expression import ModelError
 
 @dataclass(frozen=True)
 class Index:
-    """``eta + i k`` at the wavelengths asked for, and where the numbers come from."""
+    """``eta + i k`` at the wavelengths asked for, and where the numbers come from.
+
+    Where a source says nothing of the absorption, ``k`` is 0 and ``k_known`` false.
+    """
 
     eta: np.ndarray
     k: np.ndarray
     source: str
+    k_known: bool = True
 
 
 def refractive_index(material: str, wavelengths_nm: np.ndarray) -> Index:
@@ -100,7 +104,7 @@ def _of_database(material: str, wanted: np.ndarray) -> Index:
     k = np.zeros_like(wanted)
     if quantity == "k":
         k = np.broadcast_to(np.asarray(page.get_extinction_coefficient(wanted)), k.shape)
-    return Index(eta, k, f"{best.book}/{best.page}")
+    return Index(eta, k, f"{best.book}/{best.page}", k_known=quantity == "k")
 
 
 def _check_range(name: str, wanted: np.ndarray, low: float, high: float) -> None:

@@ -30,10 +30,13 @@ class Distances(NamedTuple):
     along_y: np.ndarray
 
 
-def half_vector_slopes(g: Geometry, lobe: Lobe) -> tuple[np.ndarray, np.ndarray]:
+def _towards(g: Geometry, lobe: Lobe) -> Geometry:
+    """The geometry as the lobe sees it: with the source turned, if it shines back."""
+    return jax.tree.map(np.asarray, g.turned if isinstance(lobe, Retro) else g)
+
+
+def half_vector_slopes(g: Geometry) -> tuple[np.ndarray, np.ndarray]:
     """Slopes ``hx / hz`` and ``hy / hz`` of the half vectors, infinite on the horizon."""
-    if isinstance(lobe, Retro):
-        g = g.turned
     hx, hy, hz = (np.asarray(a, dtype=np.float64) for a in (g.hx, g.hy, g.hz))
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = hx / hz, hy / hz
@@ -54,11 +57,12 @@ def distances(g: Geometry, lobe: Lobe, peak: Peak) -> Distances | None:
     """How many widths every row is away from the top; None for a lobe without a peak."""
     if peak is None:
         return None
+    g = _towards(g, lobe)
     if isinstance(peak, AxisPeak):
         # cos^n is exp(-x^2 n / 2) near its axis.
         r = axis_slopes(g, peak) * np.sqrt(0.5 * max(float(peak.exponent), 1e-3))
         return Distances(r, r, r)
-    x, y = half_vector_slopes(g, lobe)
+    x, y = half_vector_slopes(g)
     c, s = np.cos(float(peak.angle)), np.sin(float(peak.angle))
     far = ~(np.isfinite(x) & np.isfinite(y))
     x, y = np.where(far, 0.0, x), np.where(far, 0.0, y)
@@ -109,6 +113,8 @@ def used_rows(problem: Problem) -> np.ndarray:
 def sentences(problem: Problem, values: dict[str, np.ndarray]) -> list[str]:
     """Where the rows lie too far apart to show how wide a lobe is."""
     model, used = problem.model, used_rows(problem)
+    if not used.any():
+        return []
     geometry = jax.tree.map(lambda a: np.asarray(a)[used], problem.geometry)
     incidence = _incidences(geometry)
     free = problem.unknowns.free_shape
@@ -186,19 +192,21 @@ def visible_width(problem: Problem, lobe: Lobe, shape: dict[str, float]) -> floa
     peak = lobe.peak({n: jnp.asarray(v) for n, v in shape.items()})
     if peak is None:
         return None
-    geometry = jax.tree.map(np.asarray, problem.geometry)
+    geometry = _towards(problem.geometry, lobe)
     if isinstance(peak, AxisPeak):
         slope = axis_slopes(geometry, peak)
     else:
-        slope = np.hypot(*half_vector_slopes(geometry, lobe))
+        slope = np.hypot(*half_vector_slopes(geometry))
     used = used_rows(problem)
     weighted = np.where(np.asarray(problem.weight) > 0, problem.linear_target, -np.inf)
     value = np.max(weighted, axis=0)[used]
     slope = slope[used]
+    if not (value.size and np.max(value) > 0):
+        return None
     bright = value >= 0.5 * np.max(value)
     inside = float(np.max(slope[bright]))
     beyond = slope[slope > inside]
-    if not (np.max(value) > 0 and beyond.size and np.isfinite(np.min(beyond))):
+    if not (beyond.size and np.isfinite(np.min(beyond))):
         return None
     outside = float(np.min(beyond))
     return float(np.sqrt(max(inside, 0.1 * outside) * outside))

@@ -85,13 +85,8 @@ def check_honest(result: FitResult, truth: dict, measurement: Measurement) -> No
     """
     result.to_json()  # refuses numbers that are not finite
     words = " | ".join([*result.identifiability, result.solver.sentence])
-    assert result.solver.converged or "without convergence" in words
-    warned = (
-        not result.solver.converged
-        or "starts reach the best minimum" in words
-        or "closer than anything is measured" in words
-        or "source and detector are exchanged" in words
-    )
+    searched = result.solver.converged and "starts reach the best minimum" not in words
+    warned = not searched or "source and detector are exchanged" in words
     for p in result.parameters:
         if any(p.at_bound):
             assert f"{p.name} is at a bound" in words
@@ -102,13 +97,13 @@ def check_honest(result: FitResult, truth: dict, measurement: Measurement) -> No
             strict=True,
         ):
             reach = interval[1] - interval[0] if interval else 0.0
-            right = abs(v - t) <= reach + 1e-4 * abs(t)
+            right = abs(v - t) <= reach + 1e-4 * abs(t) + 1e-9
             assert right or warned or f"{p.name} " in words, (p.name, v, t, reach, words)
     rows = select_rows(measurement, result.settings.max_theta_deg)
     best = predict_geometry(Model(result.model), truth, rows.geometry)
     best = np.broadcast_to(best.reshape(rows.index.size, -1), rows.value.shape)
     truly = judge.scores(rows, best, FitOptions()).log1p
-    assert warned or result.scores.log1p <= 1.001 * truly + 1e-7, (truly, words)
+    assert not searched or result.scores.log1p <= 1.001 * truly + 1e-7, (truly, words)
 
 
 def check_values(result: FitResult, truth: dict, angles, tolerance: float) -> None:

@@ -33,14 +33,33 @@ def test_the_same_surface_under_another_name(glossy):
     assert result.scores.log1p < 1e-6
 
 
-def test_a_narrow_peak_is_sampled(glossy):
-    """As many rows on the skirt of a lobe of width 0.05 as of one of 1e-3."""
+def test_what_is_sampled(glossy):
     data = resample(glossy)
     assert data.symmetry == "bilateral"
     assert [c.name for c in data.channels] == [c.name for c in glossy.channels]
+    assert np.all(data.theta_r <= np.radians(80.0) + 1e-9)
     top = data.value[:, 0].max()
     assert np.sum(data.value[:, 0] > 0.05 * top) > 20
-    assert np.all(data.theta_r <= np.radians(80.0) + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("expression", "width"),
+    [
+        ("ggx", {"ggx.alpha": 2e-3}),
+        ("ggx(retro)", {"ggx.alpha": 2e-3}),
+        ("phong", {"phong.exponent": 1e6}),
+        ("lafortune", {"lafortune.exponent": 300.0, "lafortune.c_xy": 0.7}),
+    ],
+)
+def test_a_narrow_peak_is_sampled_wherever_it_is(expression, width):
+    """At every angle of incidence rows on the flanks, of the mirror peak and of others."""
+    angles = synthetic.directions(rings=4, azimuths=4)
+    data = synthetic.measurement(expression, width, angles=angles)
+    fixed = fit(data, expression, fix=width, cross_validate=False)
+    again = resample(fixed)
+    for theta_i in np.unique(again.theta_i.round(9)):
+        value = again.value[np.isclose(again.theta_i, theta_i), 0]
+        assert np.sum(value > 0.3 * value.max()) >= 8
 
 
 def test_a_result_can_be_named_where_a_file_is(glossy, tmp_path):

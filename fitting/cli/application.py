@@ -46,6 +46,8 @@ Examples:
   brdf stress 'ggx(aniso)'        one of them, at more points
   brdf stress ggx --options       one with all its options
   brdf stress my_lobe.py          a lobe of your own
+
+Exit code 1 of this command: a contract fails.
 """,
     "doctor": "",
 }

@@ -67,6 +67,7 @@ def _describe(out: Console, name: str) -> None:
     from fitting.expression import MEANINGS, OPTIONS, options_of
     from fitting.models import lobe_class
 
+    name = name.partition("(")[0].strip()
     if name not in _names() and not name.endswith(".py"):
         raise UsageError(f"there is no lobe {name!r}{nearest(name, _names())}")
     lobe = lobe_class(name)
@@ -115,7 +116,7 @@ def _parameters(
             _support(p),
             f"{p.default:g}",
             p.unit,
-            "yes" if p.coefficient else "shared",
+            "yes" if p.coefficient else "known" if p.given else "shared",
             p.meaning,
         )
     out.print(rows)

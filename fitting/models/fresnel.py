@@ -67,7 +67,9 @@ def split(kind: Fresnel, shape: Shape, value: Array, cos_d: Array) -> tuple[Arra
     - Schlick 1994, eq. 15, with a free grazing value: ``F = f0 (1 - q) + f90 q``,
       ``q = (1 - cos_d)^5``, linear in both; ``generalised`` has a free exponent.
     - ``f82`` (Kutz, Hasan and Edmondson 2021): Schlick less ``(1 - tint) F(1/7)
-      c (1 - c)^6 / (1/7 (6/7)^6)``, the dip of metals before grazing.
+      c (1 - c)^6 / (1/7 (6/7)^6)``, the dip of metals before grazing. It is meant for
+      metals: with ``f0`` far below ``f90`` and a small tint the dip is deeper than what is
+      there, and ``F`` is below zero around it.
     - ``dielectric``, ``conductor``: exact, times a scale.
     """
     if kind == "dielectric":

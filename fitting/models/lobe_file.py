@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import inspect
 import sys
+import zlib
 from pathlib import Path
 from types import ModuleType
 
@@ -34,7 +35,9 @@ def lobe_of_file(name: str) -> type[Lobe]:
 
 
 def _module(path: Path, name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"lobe_file_{path.stem}", path)
+    # Files of one name in several folders are several modules.
+    own = f"lobe_file_{path.stem}_{zlib.crc32(str(path).encode()):08x}"
+    spec = importlib.util.spec_from_file_location(own, path)
     if spec is None or spec.loader is None:
         raise ModelError(f"{name!r} is not a Python file")
     module = importlib.util.module_from_spec(spec)
@@ -42,15 +45,10 @@ def _module(path: Path, name: str) -> ModuleType:
     sys.modules[spec.name] = module
     try:
         spec.loader.exec_module(module)
-    except (
-        SyntaxError,
-        ImportError,
-        NameError,
-        AttributeError,
-        TypeError,
-        ValueError,
-    ) as e:
-        raise ModelError(f"{name}: cannot be loaded: {type(e).__name__}: {e}") from e
+    except _FAULTS as error:
+        del sys.modules[spec.name]
+        what = f"{type(error).__name__}: {error}"
+        raise ModelError(f"{name}: cannot be loaded: {what}") from error
     return module
 
 

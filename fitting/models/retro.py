@@ -33,6 +33,10 @@ class Retro(Lobe):
         return self.inner.linear
 
     @property
+    def relative_error(self) -> float:
+        return self.inner.relative_error
+
+    @property
     def albedo_bound(self) -> float | None:
         return self.inner.albedo_bound
 

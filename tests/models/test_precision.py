@@ -1,6 +1,6 @@
 """Rounding errors of every lobe against 50 digits, at the extremes and in between.
 
-At most 32 ulp, or twice the condition number; see `fitting.stress.precision`.
+At most 64 ulp, or 5 times the condition number; see `fitting.stress.precision`.
 """
 
 from __future__ import annotations
