@@ -11,25 +11,18 @@ by parameters) is never formed.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from fitting import albedo, objectives, qp
+from fitting import objectives, penalties, qp
 from fitting.geometry import Geometry, PolarAngles
 from fitting.model import Model
 from fitting.parameters import Scale, to_value
-
-# Where the penalty looks at the directional albedo: Gauss-Legendre nodes in the cosine,
-# which reach the grazing directions, where Schlick lobes break the limit first.
-ENERGY_COSINES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(8)[0]
-ENERGY_NODES = 16
 
 
 class Unknowns(eqx.Module):
@@ -278,8 +271,9 @@ def _accumulate(
 
     total = _sum_chunks(problem, chunk)
     if problem.penalised:
-        for features, phi in _penalty_rows(problem, u):
-            r, d = phi(_weighted(a, features[..., :n_basis, :]))
+        for penalty in penalties.of(problem):
+            features = _features(problem, u, penalty.functions)
+            r, d = penalty.residual(_weighted(a, features[..., :n_basis, :]))
             total = jax.tree.map(jnp.add, total, contract(features, r, d))
     gram, gradient, cost = total
     full = jnp.zeros((gram.shape[0], n_features, n_features), gram.dtype)
@@ -325,42 +319,6 @@ def _located(problem: Problem, rows: tuple) -> tuple:
         polar = PolarAngles(*problem.angles, *angle_rows)
         geometry = dataclasses.replace(geometry, polar=polar)
     return geometry, *data
-
-
-def _penalty_rows(problem: Problem, u: Array):
-    """Features of the penalties and how their residual follows from them."""
-    model = problem.model
-    cosines = jnp.asarray(ENERGY_COSINES, dtype=u.dtype)
-    azimuths = (0.0, 0.5 * math.pi) if model.anisotropic else (0.0,)
-
-    def energy(shape: dict[str, Array]) -> tuple[Array, ...]:
-        out: list[Array] = []
-        for i, lobe in enumerate(model.lobes):
-            own = model.of_lobe(i, shape)
-            there = [
-                albedo.albedo_basis(lobe, own, cosines, nodes=ENERGY_NODES, azimuth=azimuth)
-                for azimuth in azimuths
-            ]
-            out += [jnp.concatenate(parts) for parts in zip(*there, strict=True)]
-        return tuple(out)
-
-    def hinge(total: Array) -> tuple[Array, Array]:
-        w = jnp.sqrt(problem.energy_weight / total.shape[1])
-        return w * jax.nn.relu(total - 1.0), w * (total > 1.0)
-
-    yield _features(problem, u, energy), hinge
-    if not all(lobe.RECIPROCAL for lobe in model.lobes):
-
-        def difference(shape: dict[str, Array]) -> tuple[Array, ...]:
-            there = model.basis(shape, problem.pairs)
-            back = model.basis(shape, problem.pairs.swapped)
-            return tuple(f - b for f, b in zip(there, back, strict=True))
-
-        def plain(total: Array) -> tuple[Array, Array]:
-            w = jnp.sqrt(problem.reciprocity_weight / total.shape[1])
-            return w * total, w * jnp.ones_like(total)
-
-        yield _features(problem, u, difference), plain
 
 
 def evaluate(problem: Problem, u: Array, x: Array, linearised: Bool[Array, ""]) -> Blocks:
