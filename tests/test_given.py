@@ -9,7 +9,7 @@ import pytest
 import synthetic
 
 from data_formats import Channel
-from fitting import ModelError, fit
+from fitting import ModelError, fit, load_result, score
 from fitting.refractive_index import refractive_index
 
 # Those of a synthetic measurement of five channels.
@@ -87,6 +87,40 @@ def test_a_metal_of_known_index(tmp_path):
         fit(data, "lambert + ggx(dielectric)", material={"ggx": str(path)})
     with pytest.raises(ModelError, match=r"no lambert\.eta"):
         fit(data, "lambert + ggx(dielectric)", material={"lambert": str(path)})
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"energy": "hard"},
+        {"per_channel_shape": True},
+        {"objective": "chi2", "noise": (0.01, 1e-4), "bounds": {"ggx.alpha": (0.1, 0.4)}},
+    ],
+    ids=["hard", "per channel", "chi2"],
+)
+def test_known_indices_with_other_settings(tmp_path, settings):
+    """The fit, its cross-validation, the saved result and its score are of one mind."""
+    eta, k = np.linspace(0.3, 1.2, 5), np.linspace(3.0, 6.0, 5)
+    truth = {
+        "ggx.alpha": 0.2,
+        "ggx.eta": eta,
+        "ggx.k": k,
+        "ggx.scale": np.linspace(0.8, 0.9, 5),
+    }
+    data = spectral("ggx(conductor)", truth)
+    fixed = {"ggx.eta": eta, "ggx.k": k}
+    result = fit(data, "ggx(conductor)", fix=fixed, **settings)
+    np.testing.assert_allclose(result.parameter("ggx.alpha").value, 0.2, rtol=0.02)
+    np.testing.assert_allclose(
+        result.parameter("ggx.scale").value, truth["ggx.scale"], rtol=0.03
+    )
+    assert result.cross_validation is not None
+    assert result.cross_validation.typical < 3 * result.scores.log1p + 1.5
+    path = tmp_path / "metal.fit.json"
+    result.save(path)
+    assert score(data, load_result(path)).scores.log1p == pytest.approx(
+        result.scores.log1p, rel=1e-9
+    )
 
 
 def test_a_polished_surface_scales_with_the_wavelength():

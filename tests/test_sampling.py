@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import extremes
 import jax
 import numpy as np
 import pytest
 import synthetic
 
-from fitting import FitOptions, problem, sampling, starts
+from fitting import FitOptions, fit, problem, sampling, starts
 from fitting.model import Model
 
 
@@ -112,3 +114,24 @@ def test_the_thinned_scan_keeps_a_peak_of_few_rows():
         assert float(thin.target.max()) == float(p.target.max())
         whole = float((np.asarray(p.weight) ** 2).sum())
         assert float((np.asarray(thin.weight) ** 2).sum()) == pytest.approx(whole, rel=0.1)
+
+
+def test_a_channel_without_a_valid_value_does_not_stop_the_others():
+    truth = {"lambert.albedo": np.array([0.2, 0.3]), "ggx.alpha": 0.2}
+    data = synthetic.measurement("lambert + ggx", truth)
+    valid = data.valid.copy()
+    valid[:, 1] = False
+    data = dataclasses.replace(data, valid=valid)
+    result = fit(data, "lambert + ggx", per_channel_shape=True, cross_validate=False)
+    np.testing.assert_allclose(result.parameter("ggx.alpha").value[0], 0.2, rtol=1e-6)
+    assert any("no valid value" in s for s in result.identifiability)
+
+
+def test_a_lobe_that_shines_back_is_looked_for_where_the_source_is():
+    """A retro Phong lobe of which no row is near the mirror direction."""
+    angles = synthetic.directions(rings=24, azimuths=24)
+    truth = {"phong.exponent": 300.0, "phong.ks": 0.3}
+    data = synthetic.measurement("phong(retro)", truth, angles=angles)
+    result = fit(data, "phong(retro)", cross_validate=False)
+    np.testing.assert_allclose(result.parameter("phong.exponent").value, 300.0, rtol=1e-6)
+    assert not any("lie on the lobe" in s for s in result.identifiability)
