@@ -44,6 +44,11 @@ class Beckmann(Lobe):
     def linear(self) -> bool:
         return microfacet.linear(self)
 
+    @property
+    def albedo_bound(self) -> float:
+        """1, and with multiple scattering what its interpolation may add."""
+        return 1.003 if self.multiple_scattering else 1.0
+
     def parameters(self) -> tuple[Parameter, ...]:
         return microfacet.width_parameters(self.anisotropic) + fresnel.parameters(
             self.fresnel
