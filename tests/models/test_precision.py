@@ -23,6 +23,9 @@ STATED = table.rows(
     README.partition("<!-- stress -->")[2].partition("<!-- /")[0].split("\n")
 )
 
+# The table has about so many points of every variant.
+SOME = 2000
+
 precisions = pytest.mark.parametrize("name", ["f32", "f64"])
 
 
@@ -34,7 +37,7 @@ def check(variant: Variant, name: str, count: int, seconds: float) -> None:
     print(f"{variant} {found}")
     assert found.points >= 20
     assert found.passed, f"{variant} {found}"
-    if not relative_error(variant) and variant in VARIANTS:
+    if not relative_error(variant) and variant in VARIANTS and count <= SOME:
         # These points are some of the table's. Other processors round a little differently.
         most = STATED[table.lobe_of(variant)].maximum[name]
         assert found.maximum <= 1.1 * most + 0.5, f"the README states {most}: {found}"
@@ -55,7 +58,7 @@ def test_error_in_ulp(variant: Variant, name: str):
 @precisions
 @each(QUICK)
 def test_error_in_ulp_at_many_points(variant: Variant, name: str):
-    check(variant, name, 2000, 0.7)
+    check(variant, name, SOME, 0.7)
 
 
 @pytest.mark.full
