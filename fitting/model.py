@@ -11,7 +11,7 @@ from jaxtyping import Array, ArrayLike
 
 from fitting import expression as expr
 from fitting.geometry import Geometry, from_angles
-from fitting.models import LOBES, Lobe, lobe_class
+from fitting.models import Lobe, lobe_class, lobe_names
 from fitting.models.retro import Retro
 from fitting.parameters import Parameter
 
@@ -33,7 +33,7 @@ class Model(eqx.Module):
     expression: str = eqx.field(static=True)
 
     def __init__(self, expression: str):
-        terms = expr.parse(expression, _known_lobes())
+        terms = expr.parse(expression, lobe_names())
         self.lobes = tuple(_make_lobe(t) for t in terms)
         own = zip(terms, self.lobes, strict=True)
         self.labels = expr.lobe_labels(
@@ -124,12 +124,6 @@ def _per_channel(model: Model, values: dict[str, Array], geometry: Geometry) -> 
     channels = max(v.shape[0] for v in values.values() if v.ndim)
     wide = {n: jnp.broadcast_to(v, (channels,)) for n, v in values.items()}
     return jax.vmap(lambda one: model(one, geometry), out_axes=-1)(wide)
-
-
-def _known_lobes() -> tuple[str, ...]:
-    from importlib.metadata import entry_points
-
-    return (*LOBES, *(e.name for e in entry_points(group="fitting.models")))
 
 
 def _make_lobe(term: expr.Term) -> Lobe:

@@ -42,10 +42,10 @@ def models(
 
 def _list(out: Console) -> None:
     from fitting.cli.terminal import table
-    from fitting.models import lobe_class
+    from fitting.models import lobe_class, lobe_names
 
     rows = table("lobe", "reciprocal", "albedo", "what it is", left=4)
-    for name in _names():
+    for name in lobe_names():
         lobe = lobe_class(name)
         rows.add_row(
             name,
@@ -65,11 +65,11 @@ def _describe(out: Console, name: str) -> None:
     from fitting.cli.assignments import nearest
     from fitting.cli.terminal import bullet, heading
     from fitting.expression import MEANINGS, OPTIONS, options_of
-    from fitting.models import lobe_class
+    from fitting.models import lobe_class, lobe_names
 
     name = name.partition("(")[0].strip()
-    if name not in _names() and not name.endswith(".py"):
-        raise UsageError(f"there is no lobe {name!r}{nearest(name, _names())}")
+    if name not in lobe_names() and not name.endswith(".py"):
+        raise UsageError(f"there is no lobe {name!r}{nearest(name, lobe_names())}")
     lobe = lobe_class(name)
     out.print(f"{lobe.NAME}: {_first_line(lobe)}", style="bold")
     out.print()
@@ -126,14 +126,6 @@ def _support(p: FitParameter) -> str:
     low, high = p.support
     text = f"{low:.4g} to {'infinity' if math.isinf(high) else f'{high:.4g}'}"
     return f"{text}, periodic" if p.scale == "periodic" else text
-
-
-def _names() -> list[str]:
-    from importlib.metadata import entry_points
-
-    from fitting.models import LOBES
-
-    return [*LOBES, *(e.name for e in entry_points(group="fitting.models"))]
 
 
 def _first_line(lobe: type[Lobe]) -> str:

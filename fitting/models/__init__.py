@@ -7,7 +7,16 @@ from importlib.metadata import entry_points
 
 from fitting.models.lobe import AxisPeak, Lobe, Peak, Shape, SlopeWidths
 
-__all__ = ["LOBES", "AxisPeak", "Lobe", "Peak", "Shape", "SlopeWidths", "lobe_class"]
+__all__ = [
+    "LOBES",
+    "AxisPeak",
+    "Lobe",
+    "Peak",
+    "Shape",
+    "SlopeWidths",
+    "lobe_class",
+    "lobe_names",
+]
 
 LOBES: dict[str, str] = {
     # Matt surfaces.
@@ -43,6 +52,11 @@ LOBES: dict[str, str] = {
     "disney": "Disney",
     "openpbr": "OpenPBR",
 }
+
+
+def lobe_names() -> tuple[str, ...]:
+    """All lobes that expressions know, those of installed packages included."""
+    return (*LOBES, *(e.name for e in entry_points(group="fitting.models")))
 
 
 def lobe_class(name: str) -> type[Lobe]:

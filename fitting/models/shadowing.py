@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import Literal
 
 import jax.numpy as jnp
-import numpy as np
 from jax.scipy.special import erfc
 from jaxtyping import Array
 
 from fitting.geometry import Geometry
+from fitting.quadrature import unit_nodes
 
 Shadowing = Literal["correlated", "uncorrelated", "v_cavity", "bare"]
 
@@ -152,8 +152,8 @@ def cos_lambda_gtr(
 
 def _gauss(count: int, dtype) -> tuple[Array, Array]:
     """Gauss-Legendre nodes and weights on [0, 1]."""
-    x, w = np.polynomial.legendre.leggauss(count)
-    return jnp.asarray(0.5 * (x + 1.0), dtype), jnp.asarray(0.5 * w, dtype)
+    x, w = unit_nodes(count)
+    return jnp.asarray(x, dtype), jnp.asarray(w, dtype)
 
 
 # The series of Gamma(x + 1/2) / (Gamma(x) sqrt(x)) in 1/x.

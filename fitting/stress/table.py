@@ -13,12 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fitting.models import lobe_names
 from fitting.stress import precision
 from fitting.stress.exercise import Exercise
 from fitting.stress.precision import Precision
 from fitting.stress.reference import has_reference, relative_error
 from fitting.stress.report import PRECISIONS
-from fitting.stress.variants import Variant, lobe_names, of_name
+from fitting.stress.variants import Variant, of_name
 
 POINTS = 20_000
 HEADER = (

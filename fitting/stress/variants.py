@@ -6,12 +6,11 @@ import contextlib
 import dataclasses
 import itertools
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from typing import Any
 
 from fitting.expression import OPTIONS, ModelError, Term, options_of
 from fitting.model import Model
-from fitting.models import LOBES, Lobe, lobe_class
+from fitting.models import Lobe, lobe_class, lobe_names
 from fitting.models.retro import Retro
 from fitting.parameters import Parameter
 
@@ -72,11 +71,6 @@ class Variant:
         """The options by field."""
         core = self.core
         return {f.name: getattr(core, f.name) for f in dataclasses.fields(core)}
-
-
-def lobe_names() -> tuple[str, ...]:
-    """All lobes that expressions know, those of installed packages included."""
-    return (*LOBES, *(e.name for e in entry_points(group="fitting.models")))
 
 
 def of_expression(expression: str) -> Variant:
