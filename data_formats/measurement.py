@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Symmetry = Literal["isotropic", "bilateral", "anisotropic"]
 
+# rad; what conversion from degrees leaves of a direction on the horizon.
+_ON_HORIZON = 1e-9
+
 
 class MeasurementError(ValueError):
     """A file or a measurement that cannot be used, said in one sentence."""
@@ -90,7 +93,8 @@ class Measurement:
     """A measured BSDF: `n` pairs of directions by `c` spectral channels.
 
     The surface normal is z; `theta_i, phi_i` point to the source and `theta_r, phi_r` to
-    the detector. `theta_r > pi/2` is transmitted light. Specular reflection is
+    the detector. `theta_i > pi/2` is a sample lit from the back; `theta_r` on the other
+    side of the horizon than `theta_i` is transmitted light. Specular reflection is
     `phi_r - phi_i = pi`. Arrays are copied, float64 (`valid`: bool) and read-only.
 
     **Arguments:**
@@ -183,6 +187,19 @@ class Measurement:
         found = [c.wavelength_nm for c in self.channels if c.wavelength_nm is not None]
         return np.array(found) if len(found) == self.n_channels else None
 
+    @property
+    def transmitted(self) -> NDArray[np.bool_]:
+        """(n,) whether source and detector are on different sides of the surface.
+
+        A direction within 1e-9 rad of the horizon counts as on the other one's side.
+        """
+        return _side(self.theta_i) * _side(self.theta_r) < 0
+
+    @property
+    def from_back(self) -> NDArray[np.bool_]:
+        """(n,) whether the sample is lit from the back, `theta_i > pi/2 + 1e-9`."""
+        return _side(self.theta_i) < 0
+
     def select(self, rows: ArrayLike) -> Measurement:
         """The measurement at some rows only: a boolean mask (n,), or indices."""
         rows = np.asarray(rows)
@@ -247,6 +264,12 @@ def _frozen(
         raise MeasurementError(f"{name} has the shape {copy.shape}; expected {expected}")
     copy.setflags(write=False)
     return copy
+
+
+def _side(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) 1 in front, -1 behind, 0 on the horizon."""
+    beyond = theta - np.pi / 2
+    return np.where(np.abs(beyond) <= _ON_HORIZON, 0.0, -np.sign(beyond))
 
 
 def _finite_or_nan(array: NDArray[np.float64]) -> NDArray[np.float64]:

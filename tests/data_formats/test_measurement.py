@@ -56,6 +56,42 @@ def test_select_rows_by_mask_and_by_index():
     assert m.select(np.arange(3)).equals(m)
 
 
+def test_sides_of_the_surface():
+    edge = np.pi / 2
+    pairs = [
+        # theta_i, theta_r, transmitted, from_back
+        (0.5, 0.5, False, False),
+        (0.5, 2.0, True, False),
+        (2.0, 0.5, True, True),
+        (2.0, 2.0, False, True),
+        (np.pi, 0.0, True, True),
+        # On the horizon: on the other one's side, and in front if both are.
+        (edge, 2.0, False, False),
+        (2.0, edge, False, True),
+        (0.5, edge, False, False),
+        (edge, edge, False, False),
+        (0.5, edge + 0.9e-9, False, False),
+        (0.5, edge + 1.1e-9, True, False),
+        (edge + 0.9e-9, 0.5, False, False),
+        (edge + 1.1e-9, 0.5, True, True),
+    ]
+    theta_i, theta_r, transmitted, from_back = zip(*pairs, strict=True)
+    n = len(pairs)
+    m = made(
+        theta_i=np.array(theta_i),
+        phi_i=np.zeros(n),
+        theta_r=np.array(theta_r),
+        phi_r=np.zeros(n),
+        value=np.ones((n, 2)),
+        valid=np.ones((n, 2), bool),
+        sigma=None,
+        auxiliary={},
+    )
+    assert m.transmitted.dtype == m.from_back.dtype == np.bool_
+    assert m.transmitted.tolist() == list(transmitted)
+    assert m.from_back.tolist() == list(from_back)
+
+
 def test_equality_is_exact_and_knows_nan():
     m = made()
     assert m.equals(made())
