@@ -23,8 +23,10 @@ from dataclasses import dataclass
 
 from data_formats import metadata
 from data_formats.columns import MAX_COLUMNS, MAX_NAME, angle_of, clean, identify
-from data_formats.measurement import Measurement, MeasurementError, Note
+from data_formats.measurement import Measurement, MeasurementError
 from data_formats.number_block import Rows
+from data_formats.provenance import Note
+from data_formats.quantity import Quantity, Side
 from data_formats.source import Source, load, write_text
 from data_formats.table import Table, to_measurement
 from data_formats.text_table import Labels, rows_of_text
@@ -49,7 +51,12 @@ class _Header:
 
 
 def read(
-    path: str | os.PathLike[str], *, strict: bool = False, degrees: bool | None = None
+    path: str | os.PathLike[str],
+    *,
+    strict: bool = False,
+    degrees: bool | None = None,
+    quantity: Quantity | None = None,
+    side: Side | None = None,
 ) -> Measurement:
     """Read an E1392-style file.
 
@@ -58,6 +65,11 @@ def read(
     - `path`: of the file; gzip is unpacked.
     - `strict`: whether a wrong or missing `NUM_POINTS` is an error instead of a note.
     - `degrees`: the unit of the angles; `None`: find out.
+    - `quantity`: `"brdf"`, `"btdf"`, `"bsdf"` in 1/sr, or `"brf"`, `"btf"`: reflectance or
+        transmittance factors, to be divided by pi; `None`: as the header says, else 1/sr.
+    - `side`: `"transmitted"`: all is transmitted light, and a `theta_r` written on the
+        source's side is read as `180 - theta_r`; `"as-written"`: keep it;
+        `None`: as the header says.
 
     **Raises:** `MeasurementError` with file and line.
     """
@@ -89,7 +101,9 @@ def read(
         notes=tuple(notes),
         own=own,
     )
-    return to_measurement(table, degrees=False if own else degrees)
+    return to_measurement(
+        table, degrees=False if own else degrees, quantity=quantity, side=side
+    )
 
 
 def write(measurement: Measurement, path: str | os.PathLike[str]) -> None:

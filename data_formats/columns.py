@@ -33,7 +33,9 @@ _ANGLE_OF: dict[str, Angle] = {
 _UNIT = re.compile(
     r"^(?P<name>.*?)[\s_]*[(\[]?(?:(?P<deg>deg(?:ree)?s?|°)|(?P<rad>rad(?:ian)?s?))[)\]]?$"
 )
-_QUANTITY = r"(?:brdf|btdf|bsdf|brf|f_?r|value)"
+_QUANTITY = (
+    r"(?:brdf|btdf|bsdf|brf|f_?r|value|(?:reflectance|radiance|transmittance)[\s_]factor)"
+)
 _WAVELENGTH = re.compile(
     rf"(?:{_QUANTITY}[\s_])?(?P<number>\d+(?:[.,]\d*)?)[\s_]*(?P<unit>nm|um|µm|μm|mm|m)",
     re.ASCII | re.IGNORECASE,
@@ -61,6 +63,7 @@ class Columns:
     - `channels`: the channels with their columns.
     - `sigma`, `valid`: one column per channel, or none.
     - `others`: name to column of everything else.
+    - `labels`: the channels' names in the file.
     """
 
     angles: dict[Angle, tuple[int, Unit | None]]
@@ -68,6 +71,7 @@ class Columns:
     sigma: list[int] = field(default_factory=list)
     valid: list[int] = field(default_factory=list)
     others: dict[str, int] = field(default_factory=dict)
+    labels: list[str] = field(default_factory=list)
 
 
 def clean(name: str) -> str:
@@ -150,7 +154,8 @@ def identify(names: Sequence[str], where: str, own: Metadata | None = None) -> C
     sigma = _per_channel("sigma", rest, label_of, len(channels))
     valid = _per_channel("valid", rest, label_of, len(channels))
     others = {renamed.get(name, name): column for name, column in rest.items()}
-    return Columns(angles, channels, sigma, valid, others)
+    labels = [clean(names[column]) for _, column in channels]
+    return Columns(angles, channels, sigma, valid, others, labels)
 
 
 def _check_size(names: Sequence[str], where: str) -> None:

@@ -9,6 +9,9 @@ Three layouts of variables, MATLAB versions 4 to 7.3:
 - `brdfNN_WWW` for each incidence NN and wavelength WWW in nm on the grid `theta`, `phi`;
   missing values were filled by interpolation before publication.
 
+NN has three digits for a sample lit from the back (120). In all layouts `theta` beyond 90
+degrees is behind the surface.
+
 The laboratory's text files are in the formats `astm` and `pbrt`.
 """
 
@@ -30,6 +33,7 @@ from data_formats.measurement import (
     Note,
     Provenance,
 )
+from data_formats.quantity import Quantity, Side
 from data_formats.source import Source, load
 from data_formats.table import Table, to_measurement
 
@@ -38,7 +42,7 @@ SUFFIXES = (".mat",)
 
 _HDF5_MAGIC = b"MATLAB 7.3 MAT-file"
 _WANTED = re.compile(
-    r"dir_in|dir_out|fr|wavelengths?|theta(?:\d\d)?|phi(?:\d\d)?|brdf\d\d(?:_\d{3,4})?"
+    r"dir_in|dir_out|fr|wavelengths?|theta(?:\d{2,3})?|phi(?:\d{2,3})?|brdf\d{2,3}(?:_\d{3,4})?"
 )
 
 
@@ -47,14 +51,27 @@ def sniff(head: bytes) -> bool:
     return head.startswith(_HDF5_MAGIC) or mat_file.is_mat(head)
 
 
-def read(path: str | os.PathLike[str]) -> Measurement:
+def read(
+    path: str | os.PathLike[str],
+    *,
+    quantity: Quantity | None = None,
+    side: Side | None = None,
+) -> Measurement:
     """Read a Cornell file: MATLAB in one of the layouts above, or the text form.
+
+    **Arguments:**
+
+    - `path`: of the file; gzip is unpacked.
+    - `quantity`: `"brdf"`, `"btdf"`, `"bsdf"` in 1/sr, or `"brf"`, `"btf"`: reflectance or
+        transmittance factors, to be divided by pi; `None`: 1/sr.
+    - `side`: `"transmitted"`: all is transmitted light, and a `theta_r` written on the
+        source's side is read as `180 - theta_r`; `"as-written"`, `None`: keep it.
 
     **Raises:** `MeasurementError` if the file is damaged or has another layout.
     """
     source = load(path)
     if astm.sniff(source.head):
-        return astm.read(path)
+        return astm.read(path, quantity=quantity, side=side)
     if source.data.startswith((_HDF5_MAGIC, hdf5.MAGIC)):
         variables = _from_hdf5(source)
     elif mat_file.is_mat(source.head):
@@ -63,7 +80,7 @@ def read(path: str | os.PathLike[str]) -> Measurement:
         raise MeasurementError(
             f"{source.path}: this is no MATLAB file; it begins with {source.data[:24]!r}"
         )
-    return to_measurement(_table(source, variables))
+    return to_measurement(_table(source, variables), quantity=quantity, side=side)
 
 
 def _from_hdf5(source: Source) -> Variables:
@@ -82,9 +99,9 @@ def _table(source: Source, variables: Variables) -> Table:
         raise MeasurementError(f"{source.path}: a variable has more than two dimensions")
     if {"dir_in", "dir_out", "fr"} <= set(variables):
         blocks, wavelengths, notes = _vectors(source, variables)
-    elif any(re.fullmatch(r"brdf\d\d_\d+", n) for n in variables):
+    elif any(re.fullmatch(r"brdf\d{2,3}_\d+", n) for n in variables):
         blocks, wavelengths, notes = _gridded(source, variables)
-    elif any(re.fullmatch(r"brdf\d\d", n) for n in variables):
+    elif any(re.fullmatch(r"brdf\d{2,3}", n) for n in variables):
         blocks, wavelengths, notes = _per_incidence(source, variables)
     else:
         found = ", ".join(sorted(variables)[:10]) or "none of them"
@@ -126,7 +143,7 @@ def _vectors(source: Source, variables: Variables) -> Layout:
 def _per_incidence(source: Source, variables: Variables) -> Layout:
     wavelengths = _wavelengths(source, variables)
     blocks: list[NDArray[np.float64]] = []
-    for name in sorted(n for n in variables if re.fullmatch(r"brdf\d\d", n)):
+    for name in sorted(n for n in variables if re.fullmatch(r"brdf\d{2,3}", n)):
         incidence = name.removeprefix("brdf")
         values = _rows_by(source, name, variables[name], len(wavelengths))
         theta, phi = _grid(source, variables, incidence, len(values))
@@ -137,7 +154,7 @@ def _per_incidence(source: Source, variables: Variables) -> Layout:
 def _gridded(source: Source, variables: Variables) -> Layout:
     tables: dict[str, dict[float, NDArray[np.float64]]] = {}
     for name, content in variables.items():
-        if match := re.fullmatch(r"brdf(\d\d)_(\d+)", name):
+        if match := re.fullmatch(r"brdf(\d{2,3})_(\d+)", name):
             tables.setdefault(match[1], {})[float(match[2])] = content.ravel()
     wavelengths = sorted({w for table in tables.values() for w in table})
     blocks: list[NDArray[np.float64]] = []

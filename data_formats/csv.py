@@ -15,14 +15,15 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from data_formats import metadata
 from data_formats.columns import angle_of, clean, identify
-from data_formats.measurement import Measurement, MeasurementError, Note
+from data_formats.measurement import Measurement, MeasurementError
 from data_formats.number_block import Rows
+from data_formats.provenance import Note
+from data_formats.quantity import Quantity, Side
 from data_formats.source import load, split_lines, write_text
 from data_formats.table import Table, to_measurement
 from data_formats.text_table import Labels, rows_of_text
@@ -59,7 +60,8 @@ def read(
     path: str | os.PathLike[str],
     *,
     degrees: bool | None = None,
-    quantity: Literal["brdf", "brf"] = "brdf",
+    quantity: Quantity | None = None,
+    side: Side | None = None,
     missing: float | None = None,
 ) -> Measurement:
     """Read a delimited table.
@@ -68,7 +70,11 @@ def read(
 
     - `path`: of the file; gzip is unpacked.
     - `degrees`: the unit of angles whose column does not state it; `None`: find out.
-    - `quantity`: `"brf"` if the values are reflectance factors, to be divided by pi.
+    - `quantity`: `"brdf"`, `"btdf"`, `"bsdf"` in 1/sr, or `"brf"`, `"btf"`: reflectance or
+        transmittance factors, to be divided by pi; `None`: as the header says, else 1/sr.
+    - `side`: `"transmitted"`: all is transmitted light, and a `theta_r` written on the
+        source's side is read as `180 - theta_r`; `"as-written"`: keep it;
+        `None`: as the header says.
     - `missing`: a number that stands for "not measured", such as -1 or -999.
 
     **Raises:** `MeasurementError` with file and line.
@@ -102,10 +108,10 @@ def read(
         line_numbers=rows.line_numbers,
         own=own,
     )
-    measurement = to_measurement(table, degrees=degrees, quantity=quantity)
-    if own or quantity == "brf":
+    measurement = to_measurement(table, degrees=degrees, quantity=quantity, side=side)
+    if own or quantity is not None:
         return measurement
-    return _perhaps_brf(measurement, " ".join([*fields.values(), *header.names]))
+    return _perhaps_brf(measurement)
 
 
 def write(measurement: Measurement, path: str | os.PathLike[str]) -> None:
@@ -174,20 +180,19 @@ def _preamble(lines: Sequence[str]) -> dict[str, str]:
     return fields | ({"preamble": "\n".join(others)} if others else {})
 
 
-def _perhaps_brf(measurement: Measurement, said: str) -> Measurement:
-    """A note if words or numbers suggest reflectance factors.
+def _perhaps_brf(measurement: Measurement) -> Measurement:
+    """A note if the numbers suggest reflectance factors.
 
     A perfectly white diffuser has a BRDF of 1/pi; only glossy surfaces are brighter, and
     those in few directions.
     """
-    named = re.search(r"\bBRF|reflectance factor", said, re.IGNORECASE)
-    bright = np.median(measurement.value[measurement.valid]) > 1.2 / np.pi
-    if not named and not bright:
-        return measurement
-    reason = "The file speaks of BRF" if named else "Most values exceed 1/pi"
+    m = measurement
+    settled = {"perhaps-brf", "brf-divided-by-pi"} & {note.code for note in m.notes}
+    if settled or np.median(m.value[m.valid]) <= 1.2 / np.pi:
+        return m
     note = Note(
         "perhaps-brf",
-        f"{reason}: are they reflectance factors? They were read as BRDF; quantity='brf' "
-        "divides them by pi",
+        "Most values exceed 1/pi: are they reflectance factors? They were read as BRDF; "
+        "quantity='brf' divides them by pi",
     )
-    return replace(measurement, notes=(*measurement.notes, note))
+    return replace(m, notes=(*m.notes, note))

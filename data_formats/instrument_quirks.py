@@ -128,33 +128,37 @@ def _zero_floor(m: Measurement) -> list[Note]:
 
 
 def ramp_to_grazing(measurement: Measurement) -> Measurement:
-    """Mask rows beyond `theta_r` = 75 degrees that are a straight ramp to zero.
+    """Mask rows within 15 degrees of the horizon that are a straight ramp to zero.
 
     The Light Tec Mini-Diff V2 does not measure there; its files hold
     `v(75) (90 - theta_r)/15`, exact in the planes `phi_r` = 0, 90, 180 and 270 degrees and
-    resampled between them. No surface does that to nine digits, so the planes decide for
-    all rows of their incidence.
+    resampled between them. The same is looked for behind the surface, from 105 degrees. No
+    surface does that to nine digits, so the planes decide for all rows of their incidence
+    and side.
     """
     m = measurement
     knee = np.deg2rad(75)
     quarter = np.pi / 2
     in_plane = np.abs(m.phi_r - quarter * np.round(m.phi_r / quarter)) < _CLOSE
-    beyond = (m.theta_r > knee + _CLOSE) & (m.theta_r <= quarter + _CLOSE)
-    at_knee = np.abs(m.theta_r - knee) < _CLOSE
+    elevation = np.abs(quarter - m.theta_r)
+    beyond = elevation < quarter - knee - _CLOSE
+    at_knee = np.abs(elevation - (quarter - knee)) < _CLOSE
     if not (in_plane & beyond).any() or not (in_plane & at_knee).any():
         return m
     masked = np.zeros(m.n_rows, dtype=bool)
+    front, behind = m.theta_r < quarter + _CLOSE, m.theta_r > quarter - _CLOSE
     for incidence in np.unique(np.round(m.theta_i / _CLOSE)):
-        rows = np.abs(m.theta_i / _CLOSE - incidence) < 1
-        if _is_ramp(m, rows & in_plane & at_knee, rows & in_plane & beyond):
-            masked |= rows & beyond
+        for side in (front, behind):
+            rows = side & (np.abs(m.theta_i / _CLOSE - incidence) < 1)
+            if _is_ramp(m, rows & in_plane & at_knee, rows & in_plane & beyond):
+                masked |= rows & beyond
     if not masked.any():
         return m
     count = int(np.count_nonzero(masked))
     note = Note(
         "ramp-masked",
-        f"{count} rows beyond theta_r = 75 degrees are a straight ramp to zero, not a "
-        "measurement; masked",
+        f"{count} rows less than 15 degrees above the surface are a straight ramp to zero, "
+        "not a measurement; masked",
         count,
     )
     return replace(m, valid=m.valid & ~masked[:, None], notes=(*m.notes, note))
@@ -170,7 +174,7 @@ def _is_ramp(m: Measurement, knees: NDArray[np.bool_], beyond: NDArray[np.bool_]
     if any(int(plane[k]) not in start for k in rows):
         return False
     top = np.array([start[int(plane[k])] for k in rows])
-    slope = (np.pi / 2 - m.theta_r[rows]) / np.deg2rad(15)
+    slope = np.abs(np.pi / 2 - m.theta_r[rows]) / np.deg2rad(15)
     ramp = top * slope[:, None]
     scale = np.abs(top).max(axis=1, keepdims=True)
     return bool((scale > 0).all() and (np.abs(m.value[rows] - ramp) <= 1e-9 * scale).all())
@@ -185,6 +189,8 @@ def zeros_at_retro(measurement: Measurement) -> Measurement:
     """
     m = measurement
     zero = (m.valid & (m.value == 0)).all(axis=1)
+    # Behind the surface no detector hides a source that is in front of it.
+    zero &= ~m.transmitted
     cos_retro = np.cos(m.theta_i) * np.cos(m.theta_r) + np.sin(m.theta_i) * np.sin(
         m.theta_r
     ) * np.cos(m.phi_r - m.phi_i)

@@ -9,6 +9,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from data_formats.provenance import Note, Provenance
+
 Symmetry = Literal["isotropic", "bilateral", "anisotropic"]
 
 # rad; what conversion from degrees leaves of a direction on the horizon.
@@ -50,44 +52,6 @@ class Channel:
         return Channel(f"{wavelength_nm:.12g} nm", float(wavelength_nm))
 
 
-@dataclass(frozen=True)
-class Note:
-    """Something that a reader noticed, repaired, masked or guessed.
-
-    **Arguments:**
-
-    - `code`: a stable kebab-case name for programs, such as `"degrees-converted"`.
-    - `sentence`: the same for people.
-    - `count`: how many rows or values are concerned; 0 where counting makes no sense.
-    """
-
-    code: str
-    sentence: str
-    count: int = 0
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """Where a measurement comes from. Text is `""` where unknown.
-
-    **Arguments:**
-
-    - `path`: the file as it was named to the reader.
-    - `sha256`: of the file's bytes, before any decompression.
-    - `format`: `NAME` of the format that read it.
-    - `instrument`, `sample`, `date`: as stated in the file.
-    - `header`: every header field of the file.
-    """
-
-    path: str = ""
-    sha256: str = ""
-    format: str = ""
-    instrument: str = ""
-    sample: str = ""
-    date: str = ""
-    header: Mapping[str, str] = field(default_factory=dict)
-
-
 @dataclass(frozen=True, eq=False)
 class Measurement:
     """A measured BSDF: `n` pairs of directions by `c` spectral channels.
@@ -102,8 +66,7 @@ class Measurement:
     - `theta_i`, `phi_i`, `theta_r`, `phi_r`: (n,) rad; theta in [0, pi].
     - `value`: (n, c) BSDF in 1/sr, without cosine; negatives as measured. Finite where
         `valid`.
-    - `valid`: (n, c) False: not measured, below the horizon, extrapolated by the
-        instrument, not finite.
+    - `valid`: (n, c) False: not measured, extrapolated by the instrument, not finite.
     - `channels`: c channels, with distinct names and wavelengths.
     - `sigma`: (n, c) standard uncertainty (k = 1) in 1/sr, positive where `valid`.
     - `symmetry`: `"isotropic"`: depends on `phi_r - phi_i` only; `"bilateral"`: isotropic,
@@ -125,7 +88,7 @@ class Measurement:
     channels: tuple[Channel, ...]
     sigma: NDArray[np.float64] | None = None
     symmetry: Symmetry = "isotropic"
-    provenance: Provenance = Provenance()
+    provenance: Provenance = field(default_factory=Provenance)
     notes: tuple[Note, ...] = ()
     auxiliary: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 

@@ -15,6 +15,8 @@ from data_formats.measurement import (
     Provenance,
     Symmetry,
 )
+from data_formats.provenance import one_line
+from data_formats.quantity import says_factor
 from data_formats.source import Source
 
 KEY = "MEASUREMENT_JSON"
@@ -139,21 +141,21 @@ def is_header_key(key: str) -> bool:
     return key.isascii() and key.isupper() and key.replace("_", "").isalnum()
 
 
-def one_line(text: str) -> str:
-    """Text without line breaks and characters that cannot be printed."""
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
-
-
 def header_fields(provenance: Provenance) -> Mapping[str, str]:
-    """The header to write for people: known fields under their names in E1392 files."""
+    """The header to write for people: known fields under their names in E1392 files.
+
+    A field that speaks of factors is left out: what is written is in 1/sr.
+    """
     fields = {
         k: one_line(v)
         for k, v in provenance.header.items()
         if is_header_key(k) and k not in ("VARS", "NUM_POINTS", KEY)
+        if not says_factor(k, v)
     }
     known = {
         "SYSTEM_NAME": provenance.instrument,
         "SAMPLE_NAME": provenance.sample,
         "MEAS_DATE": provenance.date,
     }
-    return {k: one_line(v) for k, v in known.items() if v} | fields
+    stated = {k: one_line(v) for k, v in known.items() if v}
+    return stated | fields | {"QUANTITY": "BSDF in 1/sr without cosine"}

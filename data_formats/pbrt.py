@@ -13,6 +13,7 @@ import numpy as np
 
 from data_formats.columns import FOUR_ANGLES, MAX_COLUMNS, Columns
 from data_formats.measurement import Channel, Measurement, MeasurementError, Provenance
+from data_formats.quantity import Quantity, Side
 from data_formats.source import Source, load
 from data_formats.table import Table, to_measurement
 
@@ -38,8 +39,22 @@ def sniff(head: bytes) -> bool:
     return bool(some) and all(low < w < high for w in wavelengths)
 
 
-def read(path: str | os.PathLike[str]) -> Measurement:
+def read(
+    path: str | os.PathLike[str],
+    *,
+    quantity: Quantity | None = None,
+    side: Side | None = None,
+) -> Measurement:
     """Read a pbrt-v2 measured material.
+
+    **Arguments:**
+
+    - `path`: of the file; gzip is unpacked.
+    - `quantity`: `"brdf"`, `"btdf"`, `"bsdf"` in 1/sr, or `"brf"`, `"btf"`: reflectance or
+        transmittance factors, to be divided by pi; `None`: as the comments say, else 1/sr.
+    - `side`: `"transmitted"`: all is transmitted light, and a `theta_r` written on the
+        source's side is read as `180 - theta_r`; `"as-written"`: keep it;
+        `None`: as the comments say.
 
     **Raises:** `MeasurementError` with file and line.
     """
@@ -88,7 +103,7 @@ def read(path: str | os.PathLike[str]) -> Measurement:
         ),
         line_numbers=line_of[n + 1 :: size],
     )
-    return to_measurement(table)
+    return to_measurement(table, quantity=quantity, side=side)
 
 
 def _is_count(token: str) -> bool:

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from data_formats.columns import Angle, Columns
-from data_formats.instrument_quirks import apply_quirks
-from data_formats.measurement import (
-    Measurement,
-    MeasurementError,
-    Note,
-    Provenance,
-    Symmetry,
+from data_formats.columns import Columns
+from data_formats.directions import (
+    Angles,
+    in_radians,
+    same_side,
+    snap_to_edges,
+    unfolded,
 )
+from data_formats.instrument_quirks import apply_quirks
+from data_formats.measurement import Channel, Measurement, MeasurementError
 from data_formats.metadata import Metadata, kept
-
-Quantity = Literal["brdf", "brf"]
-
-# Angles printed with few digits may end slightly beyond 90 degrees.
-_SLACK = 1e-3
+from data_formats.provenance import Note, Provenance
+from data_formats.quantity import Quantity, Reading, Side, is_factor, reading
+from data_formats.survey import describe, in_wavelength_order
 
 
 @dataclass(frozen=True)
@@ -56,24 +54,38 @@ class Table:
 
 
 def to_measurement(
-    table: Table, *, degrees: bool | None = None, quantity: Quantity = "brdf"
+    table: Table,
+    *,
+    degrees: bool | None = None,
+    quantity: Quantity | None = None,
+    side: Side | None = None,
 ) -> Measurement:
-    """Convert units, mask what is no number, and say so in notes.
+    """Convert units and sides, mask what is no number, and say so in notes.
 
     **Arguments:**
 
     - `table`: what was read.
     - `degrees`: the unit of angles whose column does not state it; `None`: find out.
-    - `quantity`: `"brf"`: the values are reflectance factors, `pi` times the BRDF.
+    - `quantity`, `side`: as for `quantity.reading`. Factors are divided by pi; where every
+        row is transmitted light and none is on the other side as written, `theta_r` is
+        read as `pi - theta_r`.
 
-    **Raises:** `MeasurementError` with file and line if a direction is missing or outside
-    its hemisphere, or no value is valid.
+    **Raises:** `MeasurementError` with file and line if a direction is missing or out of
+    range, if no value is valid, or if some rows only are on the other side although
+    `side` or `quantity` says that all are transmitted light.
     """
-    if quantity not in ("brdf", "brf"):
-        raise MeasurementError(f"quantity is {quantity!r}; expected 'brdf' or 'brf'")
-    notes = list(table.notes)
-    theta_i, phi_i, theta_r, phi_r = _directions(table, degrees, notes)
+    own = table.own
     columns, numbers = table.columns, table.numbers
+    # A file written here says the sides and 1/sr by its numbers; only the user overrides.
+    header = {} if own else table.provenance.header
+    how = reading(header, [] if own else columns.labels, quantity=quantity, side=side)
+    notes, changes = list(table.notes), list[Note]()
+    path = table.provenance.path
+    angles = in_radians(numbers, columns, path, table.where, degrees, notes)
+    if own is None:
+        angles = snap_to_edges(angles, table.where, notes)
+    angles = _on_its_side(angles, how, path, changes)
+
     value = numbers[:, [c for _, c in columns.channels]]
     valid = np.isfinite(value)
     if missing := int(np.count_nonzero(~valid)):
@@ -88,214 +100,98 @@ def to_measurement(
     if columns.valid:
         valid &= numbers[:, columns.valid] == 1
     sigma = numbers[:, columns.sigma] if columns.sigma else None
-    if quantity == "brf":
+    channels = tuple(c for c, _ in columns.channels)
+    if how.factor:
         value = value / np.pi
         sigma = None if sigma is None else sigma / np.pi
-        notes.append(Note("brf-divided-by-pi", "Reflectance factors divided by pi"))
+        channels = _renamed(channels, how)
+    changes += _factor_notes(how)
     if not valid.any():
-        raise MeasurementError(
-            f"{table.provenance.path}: none of the {value.size} values is valid"
-        )
+        raise MeasurementError(f"{path}: none of the {value.size} values is valid")
 
     measurement = Measurement(
-        theta_i=theta_i,
-        phi_i=phi_i,
-        theta_r=theta_r,
-        phi_r=phi_r,
+        **angles,
         value=value,
         valid=valid,
-        channels=tuple(c for c, _ in columns.channels),
+        channels=channels,
         sigma=sigma,
         provenance=table.provenance,
-        notes=tuple(notes),
+        notes=(*notes, *changes),
         auxiliary={k: numbers[:, c] for k, c in columns.others.items()},
     )
-    if own := table.own:
+    if own:
         return replace(
             measurement,
             symmetry=own.symmetry,
             provenance=kept(table.provenance, own.provenance),
-            notes=own.notes,
+            notes=(*own.notes, *changes),
         )
     return apply_quirks(describe(in_wavelength_order(measurement)))
 
 
-def _directions(
-    table: Table, degrees: bool | None, notes: list[Note]
-) -> list[NDArray[np.float64]]:
-    """theta_i, phi_i, theta_r, phi_r in radians."""
-    angles = table.columns.angles
-    raw: dict[Angle, NDArray[np.float64]] = {
-        name: table.numbers[:, column] for name, (column, _) in angles.items()
-    }
-    for name, column in raw.items():
-        if not np.isfinite(column).all():
-            row = int(np.argmin(np.isfinite(column)))
-            raise MeasurementError(f"{table.where(row)}: {name} is not a number")
-    stated = [unit for _, unit in angles.values() if unit is not None]
-    if degrees is None:
-        degrees = set(stated) == {"deg"} if stated else _in_degrees(table, raw)
-    converted: list[Angle] = [
-        name for name, (_, u) in angles.items() if u == "deg" or (u is None and degrees)
-    ]
-    for name in converted:
-        raw[name] = np.deg2rad(raw[name])
-    if converted:
-        notes.append(Note("degrees-converted", "Angles converted from degrees to radians"))
-    _complete(table, raw, notes)
-    if table.own is None:
-        _snap_to_horizon(table, raw, notes)
-    return [raw["theta_i"], raw["phi_i"], raw["theta_r"], raw["phi_r"]]
-
-
-def _complete(
-    table: Table, raw: dict[Angle, NDArray[np.float64]], notes: list[Note]
-) -> None:
-    """Add the azimuths that the file leaves out."""
-    zero = np.zeros(len(table.numbers))
-    have = set(raw)
-    if have == {"theta_i", "phi_i", "theta_r", "phi_r"}:
-        pass
-    elif have == {"theta_i", "theta_r", "phi_r"}:
-        raw["phi_i"] = zero
-        notes.append(Note("phi-i-absent", "No phi_i in the file; phi_i = 0 assumed"))
-    elif have == {"theta_i", "theta_r", "dphi"}:
-        raw["phi_i"], raw["phi_r"] = zero, raw["dphi"]
+def _on_its_side(angles: Angles, how: Reading, path: str, notes: list[Note]) -> Angles:
+    """The angles with `theta_r` on the side where the light was measured."""
+    same, other = same_side(angles)
+    n_same, n_other = int(np.count_nonzero(same)), int(np.count_nonzero(other))
+    if not n_same or not (how.transmitted or how.perhaps_transmitted):
+        return angles
+    if how.transmitted and not n_other:
         notes.append(
-            Note("dphi-only", "Only the azimuth difference is given; phi_i = 0 assumed")
+            Note(
+                "folded-transmission",
+                f"The values are of transmitted light ({how.transmitted}), but theta_r is "
+                f"on the source's side in all of {n_same} rows: read as 180 degrees - "
+                "theta_r; side='as-written' keeps it",
+                n_same,
+            )
         )
-    elif have == {"theta_i", "theta_r"}:
-        raw["phi_i"] = zero
-        raw["phi_r"] = np.where(raw["theta_r"] > 0, np.pi, 0.0)
-        raw["theta_r"] = np.abs(raw["theta_r"])
-        notes.append(
-            Note("in-plane", "Two angles only: a receiver angle > 0 is the specular side")
-        )
-    else:
+        return unfolded(angles)
+    if how.transmitted and how.asked:
         raise MeasurementError(
-            f"{table.provenance.path}: the angles found are {sorted(have)}; expected "
-            "theta_i, phi_i, theta_r, phi_r (or theta_s, phi_s)"
+            f"{path}: {how.transmitted} says that all is transmitted light, but theta_r is "
+            f"on the source's side in {n_same} rows and on the other in {n_other}; read "
+            "the file without that option, or split it"
         )
-
-
-def _in_degrees(table: Table, raw: dict[Angle, NDArray[np.float64]]) -> bool:
-    """Whether most directions cannot be in radians.
-
-    One row beyond the range is a bad row, not a unit; a file in degrees has few rows
-    that would pass for radians.
-    """
-    beyond = np.zeros(len(table.numbers), dtype=bool)
-    for name, angle in raw.items():
-        limit = np.pi if name.startswith("theta") else 2 * np.pi
-        beyond |= np.abs(angle) > limit + 2e-2
-    if not beyond.any() or beyond.mean() > 0.5:
-        return bool(beyond.any())
-    row = int(np.argmax(beyond))
-    shown = ", ".join(f"{k} = {v[row]:g}" for k, v in raw.items())
-    raise MeasurementError(
-        f"{table.where(row)}: {shown} cannot be radians, but most rows can; correct the "
-        "row, or say degrees=True or degrees=False"
-    )
-
-
-def _snap_to_horizon(
-    table: Table, raw: dict[Angle, NDArray[np.float64]], notes: list[Note]
-) -> None:
-    """Check the ranges of theta; put rounding beyond 90 degrees back on the horizon."""
-    snapped = 0
-    limits: dict[Angle, float] = {"theta_i": np.pi / 2, "theta_r": np.pi}
-    for name, limit in limits.items():
-        theta = raw[name]
-        wrong = ~((theta >= 0) & (theta <= limit + _SLACK))
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            raise MeasurementError(
-                f"{table.where(row)}: {name} is {np.rad2deg(theta[row]):.6g} degrees; "
-                f"expected 0 to {np.rad2deg(limit):g}"
-            )
-        for edge in (np.pi / 2, np.pi):
-            near = (theta > edge) & (theta <= edge + _SLACK)
-            # A float64's rounding needs no mention; a file's few digits do.
-            snapped += int(np.count_nonzero(near & (theta > edge + 1e-9)))
-            theta = np.where(near, edge, theta)
-        raw[name] = theta
-    if snapped:
+    if how.transmitted or not n_other:
         notes.append(
             Note(
-                "theta-rounded",
-                f"{snapped} angles just beyond 90 degrees set to it",
-                snapped,
+                "perhaps-folded",
+                f"The file speaks of transmission "
+                f"({how.transmitted or how.perhaps_transmitted}), but theta_r is on the "
+                f"source's side in {n_same} rows: was it written folded? It was kept; "
+                "side='transmitted' reads it as 180 degrees - theta_r",
+                n_same,
             )
         )
+    return angles
 
 
-def in_wavelength_order(measurement: Measurement) -> Measurement:
-    """Channels in ascending order of wavelength, with a note if they were not."""
-    wavelengths = measurement.wavelengths
-    if wavelengths is None or (np.diff(wavelengths) > 0).all():
-        return measurement
-    order = np.argsort(wavelengths)
-    sigma = measurement.sigma
-    note = Note("channels-sorted", "Channels were not in the order of wavelength; sorted")
-    return replace(
-        measurement,
-        value=measurement.value[:, order],
-        valid=measurement.valid[:, order],
-        sigma=None if sigma is None else sigma[:, order],
-        channels=tuple(measurement.channels[k] for k in order),
-        notes=(*measurement.notes, note),
+def _factor_notes(how: Reading) -> list[Note]:
+    what, factor, plain = (
+        ("transmittance", "btf", "btdf")
+        if how.transmitted
+        else ("reflectance", "brf", "brdf")
     )
-
-
-def describe(measurement: Measurement) -> Measurement:
-    """State the symmetry that the directions show, and count what is worth knowing."""
-    notes = list(measurement.notes)
-    negative = int(np.count_nonzero(measurement.valid & (measurement.value < 0)))
-    if negative:
-        notes.append(
-            Note("negative-values", f"negative values: {negative}; kept", negative)
+    if how.factor:
+        sentence = f"The values are {what} factors ({how.factor}): divided by pi"
+        if not how.factor.startswith("quantity="):
+            sentence += f"; quantity={plain!r} reads them as {plain.upper()} in 1/sr"
+        return [Note("brf-divided-by-pi", sentence)]
+    if how.perhaps_factor:
+        sentence = (
+            f"The file speaks of {how.perhaps_factor!r}: are the values {what} factors? "
+            f"They were read as {plain.upper()} in 1/sr; quantity={factor!r} divides them "
+            "by pi"
         )
-    if twice := _duplicates(measurement):
-        notes.append(
-            Note(
-                "duplicate-directions",
-                f"rows that repeat a pair of directions: {twice}",
-                twice,
-            )
-        )
-    symmetry = detect_symmetry(measurement)
-    if symmetry == "bilateral":
-        notes.append(
-            Note(
-                "half-hemisphere",
-                "Only one side of the plane of incidence was measured; mirror symmetry is "
-                "assumed",
-            )
-        )
-    return replace(measurement, symmetry=symmetry, notes=tuple(notes))
+        return [Note("perhaps-brf", sentence)]
+    return []
 
 
-def detect_symmetry(measurement: Measurement) -> Symmetry:
-    """Anisotropic if there are several `phi_i`; bilateral if all is on one side."""
-    oblique = measurement.theta_i > 1e-6
-    phi_i = measurement.phi_i[oblique]
-    # Compared on the circle: -pi and pi are the same azimuth.
-    if phi_i.size and np.abs(np.exp(1j * phi_i) - np.exp(1j * phi_i[0])).max() > 1e-5:
-        return "anisotropic"
-    side = np.sin(measurement.phi_r - measurement.phi_i)
-    side = side[(measurement.theta_r > 1e-6) & oblique]
-    if (side < -1e-5).any() != (side > 1e-5).any():
-        return "bilateral"
-    return "isotropic"
-
-
-def _duplicates(measurement: Measurement) -> int:
-    m = measurement
-    angles = zip(
-        m.theta_i.tolist(),
-        m.phi_i.tolist(),
-        m.theta_r.tolist(),
-        m.phi_r.tolist(),
-        strict=True,
+def _renamed(channels: tuple[Channel, ...], how: Reading) -> tuple[Channel, ...]:
+    """A band called `brf` is called `brdf` when its values are."""
+    name = "btdf" if how.transmitted else "brdf"
+    if name in {c.name for c in channels} or sum(is_factor(c.name) for c in channels) != 1:
+        return channels
+    return tuple(
+        Channel(name, c.wavelength_nm) if is_factor(c.name) else c for c in channels
     )
-    return m.n_rows - len(set(angles))

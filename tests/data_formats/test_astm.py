@@ -183,7 +183,7 @@ def test_one_row_beyond_the_range_is_no_unit(read):
 @pytest.mark.parametrize(
     ("angle", "message"),
     [
-        ("1.6,0,0.5,0", "line 6: theta_i is 91.6732 degrees; expected 0 to 90"),
+        ("3.15,0,0.5,0", "line 6: theta_i is 180.482 degrees; expected 0 to 180"),
         ("-0.1,0,0.5,0", "line 6: theta_i is -5.72958 degrees"),
         ("0.1,0,-0.5,0", "line 6: theta_r is -28.6479 degrees; expected 0 to 180"),
         ("nan,0,0.5,0", "line 6: theta_i is not a number"),

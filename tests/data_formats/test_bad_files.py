@@ -93,7 +93,7 @@ def test_unreadable_file(tmp_path, monkeypatch):
         b"VARS\n",
         b"VARS theta_i,phi_i,theta_s,phi_s,450nm",
         b"VARS theta_i,phi_i,theta_s,phi_s,450nm\n" + b"0,0,0,0,nan\n" * 9,
-        b"VARS theta_i,phi_i,theta_s,phi_s,450nm\n2,0,0,0,1\n",
+        b"VARS theta_i,phi_i,theta_s,phi_s,450nm\n-2,0,0,0,1\n",
         b"VARS theta_i,phi_i,theta_s,phi_s,450nm,450nm\n0,0,0,0,1,1\n",
         b"theta_i,theta_r,dphi,R\n" + b"\0",
         b"31 " + b"400 " * 31,

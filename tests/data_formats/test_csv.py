@@ -102,7 +102,6 @@ def test_reflectance_factors(read):
     assert "brf-divided-by-pi" in codes(m)
     assert "perhaps-brf" not in codes(m)
     assert "perhaps-brf" not in codes(read(text.replace("0.9", "0.3")))
-    assert "perhaps-brf" in codes(read("BRF values\n" + text.replace("0.9", "0.3")))
     with pytest.raises(MeasurementError, match="quantity is 'radiance'"):
         read(text, quantity="radiance")
 
@@ -143,7 +142,7 @@ def test_a_given_mask(read):
         ("theta_i,theta_r,dphi,R\n1,1,1,1\n1,1,1\n", "line 3: the row has 3 fields"),
         ("theta_i,theta_r,dphi,R\n1,1,1,red\n", "line 2, column R: 'red' is not a number"),
         ("theta_i,phi_i,theta_r,R\n1,1,1,1\n", "the angles found are"),
-        ("theta_i_deg,theta_r_deg,dphi,R\n95,1,1,1\n", "line 2: theta_i is 95 degrees"),
+        ("theta_i_deg,theta_r_deg,dphi,R\n195,1,1,1\n", "line 2: theta_i is 195 degrees"),
         ("theta_i,theta_r,dphi,R\n1,1,1,nan\n", "none of the 1 values is valid"),
         (
             "theta_i,theta_r,dphi,550nm,550 nm\n1,1,1,1,1\n",

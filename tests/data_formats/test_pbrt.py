@@ -64,7 +64,7 @@ def test_same_as_astm_with_the_cornell_quirks(tmp_path, write_astm, shadowed_row
         (TEXT.replace("0.34", ""), "do not make whole records"),
         (TEXT + "1\n", "do not make whole records"),
         (TEXT.replace("0.7", "x"), "line 8: 'x' is not a number"),
-        (TEXT.replace("0.7", "1.7").replace("0.5", "1.7"), "line 7: theta_i is 97"),
+        (TEXT.replace("0.5", "3.2"), "line 7: theta_i is 183"),
         (TEXT.replace("450", "-450"), "wavelengths from -450 to 550 nm"),
         (TEXT.replace("550", "450"), "two channels have the name 450 nm"),
         (TEXT.replace("2\n450", "0\n450"), "expected the number of wavelengths"),

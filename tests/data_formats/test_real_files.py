@@ -104,13 +104,18 @@ def test_in_plane_table(real_data: Path):
 
 def test_reflectance_factor_table(real_data: Path):
     path = real_data / "csv/20250210_S7_sample_final.txt"
-    m = data_formats.read(path, quantity="brf")
+    m = data_formats.read(path)
     assert (m.n_rows, m.n_channels) == (19, 11)
     assert m.wavelengths[0] == 385.65
     assert m.valid.all()
     assert np.median(m.value) * np.pi == pytest.approx(1.0, abs=0.05)
     assert codes(m)["duplicate-directions"] == 1
-    assert "perhaps-brf" in codes(data_formats.read(path))
+    assert "brf-divided-by-pi" in codes(m)
+    assert "perhaps-brf" not in codes(m)
+    assert data_formats.read(path, quantity="brf").equals(m)
+    as_brdf = data_formats.read(path, quantity="brdf")
+    assert not {"brf-divided-by-pi", "perhaps-brf"} & set(codes(as_brdf))
+    np.testing.assert_array_equal(as_brdf.value / np.pi, m.value)
     assert "BRF Values" in m.provenance.header["preamble"]
 
 
