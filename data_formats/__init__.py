@@ -1,12 +1,8 @@
-"""Files of measured reflectance: `read` any of them, `write` some of them."""
+"""Files of measured reflectance: `read` any, `write` some, `join` several of a sample."""
 
-from data_formats.measurement import (
-    Channel,
-    Measurement,
-    MeasurementError,
-    Note,
-    Provenance,
-)
+from data_formats.join import join
+from data_formats.measurement import Channel, Measurement, MeasurementError
+from data_formats.provenance import Note, Provenance
 from data_formats.registry import FormatInfo, formats, read, write
 
 __all__ = [
@@ -17,6 +13,7 @@ __all__ = [
     "Note",
     "Provenance",
     "formats",
+    "join",
     "read",
     "write",
 ]
