@@ -21,7 +21,12 @@ OPTIONS: dict[str, tuple[str, object]] = {
     "bare": ("shadowing", "bare"),
     "ms": ("multiple_scattering", True),
     "spectral": ("spectral", True),
+    "beckmann": ("distribution", "beckmann"),
+    "two_widths": ("two_widths", True),
+    "mixed": ("polarisation", "mixed"),
+    "media": ("media", True),
     "retro": ("retro", True),
+    "back": ("back", True),
 }
 
 MEANINGS: dict[str, str] = {
@@ -38,16 +43,20 @@ MEANINGS: dict[str, str] = {
     "bare": "D F / 4: no shadowing, no 1 / (cos_i cos_o); for metal flakes",
     "ms": "with what is scattered more than once (Kulla and Conty)",
     "spectral": "one surface for all wavelengths, scaled as theory has it",
+    "beckmann": "facets of Beckmann's distribution instead of GGX",
+    "two_widths": "a width of its own for transmitted light",
+    "mixed": "polarisations mixed between the faces of a plate, as renderers do",
+    "media": "different media in front and behind, by their relative index",
     "retro": "turned around: shines back at the source",
+    "back": "turned over: at the back of the sample instead of at its front",
 }
 
 
 def options_of(lobe: Any) -> list[str]:
     """The words for the options that a class of lobes has."""
     fields = lobe.__dataclass_fields__
-    return [
-        o for o, (f, _) in OPTIONS.items() if f in fields or (f == "retro" and lobe.RETRO)
-    ]
+    wrappers = {"retro": lobe.RETRO, "back": True}
+    return [o for o, (f, _) in OPTIONS.items() if f in fields or wrappers.get(f)]
 
 
 _TERM = re.compile(

@@ -9,27 +9,21 @@ from collections.abc import Callable
 from importlib.metadata import version
 from typing import Any
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
+import msgspec
 import numpy as np
 
 from data_formats import Measurement
-from fitting import diagnostics, judge, problem, summary
-from fitting.albedo import model_albedo
+from fitting import judge, problem, summary
+from fitting.data_record import data_record
 from fitting.expression import ModelError
 from fitting.given import with_given
 from fitting.model import Model
 from fitting.options import FitOptions
-from fitting.predict import predict_geometry
-from fitting.problem import Rows, reciprocity_pairs, select_rows, with_noise_of
+from fitting.problem import Rows, select_rows, with_noise_of
 from fitting.result import (
     SCHEMA_VERSION,
     Channel,
-    Data,
-    DataAlbedo,
-    DataNote,
-    DataReciprocity,
     Energy,
     FitResult,
     Reciprocity,
@@ -39,14 +33,15 @@ from fitting.result import (
 from fitting.search import again, predicted_by, robust_width, search
 from fitting.summary import Found, joined_values
 from fitting.uncertainty import covariance
+from fitting.unseen import without_unseen
 from fitting.validation import cross_validation
+from fitting.violations import worst_albedo, worst_reciprocity
 
 Progress = Callable[[str], None]
 _SAME_COST = 1e-6
 _ROUNDING = 1e-16
 _NOTICEABLY_COSTLIER = 1.001
 _FAR_COSTLIER = 1e4
-_DENSE_NODES = 32
 _NOISE_ROUNDS = 2
 
 
@@ -77,9 +72,11 @@ def fit(
     model = model if isinstance(model, Model) else Model(model)
     say = progress or (lambda _: None)
     options = with_given(measurement, model, options)
-    rows = select_rows(measurement, options.max_theta_deg)
+    rows = select_rows(measurement, options.max_theta_deg, model.ways)
     with jax.enable_x64(True):
-        return _fit(measurement, rows, model, options, cross_validate, colour, say)
+        options, unseen = without_unseen(rows, model, options)
+        found = _fit(measurement, rows, model, options, cross_validate, colour, say)
+    return msgspec.structs.replace(found, identifiability=[*unseen, *found.identifiability])
 
 
 def _fit(
@@ -106,13 +103,13 @@ def _fit(
         width = robust_width(rows, objective, options, found)
         found = again(rows, model, options, found, robust_width=width)
     wants_energy = options.energy != "hard" and float(options.energy) > 0
-    one_sided = not all(lobe.RECIPROCAL for lobe in model.lobes) and options.reciprocity > 0
-    worst = _worst_albedo(model, found)
-    exceeds = wants_energy and worst[0] > 1.0
+    one_sided = not model.reciprocal and options.reciprocity > 0
+    worst = worst_albedo(model, found)
+    exceeds = wants_energy and worst.albedo > 1.0
     if exceeds or one_sided:
         say("again with the penalties")
         found = again(rows, model, options, found, robust_width=width, penalised=True)
-        worst = _worst_albedo(model, found)
+        worst = worst_albedo(model, found)
     say("uncertainties")
     covariances = [covariance(f.problem, f.solution) for f in found]
     values = joined_values(found)
@@ -122,7 +119,6 @@ def _fit(
         say("leaving out each angle of incidence")
         validation = cross_validation(rows, model, objective, options, found, width)
     parameters, correlations, words = summary.parameters(model, found, covariances, names)
-    albedo, theta, worst_channel = worst
     if exceeds:
         words.append(
             "the energy penalty holds the fit: without it the albedo would exceed 1; the "
@@ -145,60 +141,32 @@ def _fit(
         by_channel=judge.by_channel(rows, predicted, names),
         cross_validation=validation,
         energy=Energy(
-            max_albedo=albedo,
-            theta_deg=theta,
-            channel=names[worst_channel],
+            max_albedo=worst.albedo,
+            theta_deg=worst.theta_deg,
+            channel=names[worst.channel],
             constraint="hard" if options.energy == "hard" else
             ("penalty" if wants_energy else "none"),
             weight=float(options.energy) if options.energy != "hard" else None,
             active=exceeds,
+            side=worst.side,
+            transmitted=worst.transmitted,
         ),
         reciprocity=_reciprocity(model, values, options),
         colour=_colour(measurement, rows, predicted) if colour else None,
         solver=_solver(found, objective),
-        data=_data(measurement, rows),
+        data=data_record(measurement, rows, float(np.mean(model.relative_index(values)))),
         versions=_versions(),
         references=sorted({lobe.REFERENCE for lobe in model.lobes}),
     )  # fmt: skip
 
 
-def _worst_albedo(model: Model, found: list[Found]) -> tuple[float, float, int]:
-    """Largest directional albedo, its polar angle in deg, and the channel, densely."""
-    theta = np.concatenate([np.arange(0.0, 80.0, 4.0), np.arange(80.0, 90.0, 0.5)])
-    cosines = jnp.asarray(np.cos(np.radians(theta)))
-    azimuths = np.radians([0.0, 45.0, 90.0, 135.0] if model.anisotropic else [0.0])
-    worst = (-math.inf, 0.0, 0)
-    channel = 0
-    for f in found:
-        for azimuth in azimuths:
-            e = np.asarray(
-                _dense_albedo(model, f.values(), cosines, jnp.asarray(azimuth))
-            ).reshape(theta.size, -1)
-            k, c = np.unravel_index(int(np.argmax(e)), e.shape)
-            worst = max(worst, (float(e[k, c]), float(theta[k]), channel + int(c)))
-        channel += f.solution.x.shape[0]
-    return worst
-
-
-@eqx.filter_jit
-def _dense_albedo(
-    model: Model, values: dict[str, Any], cosines: jax.Array, azimuth: jax.Array
-) -> jax.Array:
-    return model_albedo(model, values, cosines, azimuth=azimuth, nodes=_DENSE_NODES)
-
-
 def _reciprocity(
     model: Model, values: dict[str, np.ndarray], options: FitOptions
 ) -> Reciprocity:
-    pairs = reciprocity_pairs()
-    there = predict_geometry(model, values, pairs)
-    back = predict_geometry(model, values, pairs.swapped)
-    size = np.maximum(0.5 * (np.abs(there) + np.abs(back)), 1e-300)
-    by_construction = all(lobe.RECIPROCAL for lobe in model.lobes)
     return Reciprocity(
-        float(np.max(np.abs(there - back) / size)),
-        by_construction,
-        None if by_construction else options.reciprocity,
+        worst_reciprocity(model, values),
+        model.reciprocal,
+        None if model.reciprocal else options.reciprocity,
     )
 
 
@@ -265,27 +233,6 @@ def _settings(objective: str, options: FitOptions) -> Settings:
         bounds={k: (end(a), end(b)) for k, (a, b) in options.bounds.items()},
         tie=dict(options.tie),
         material=dict(options.material),
-    )
-
-
-def _data(m: Measurement, rows: Rows) -> Data:
-    reciprocity = diagnostics.data_reciprocity(m)
-    return Data(
-        path=m.provenance.path,
-        sha256=m.provenance.sha256,
-        format=m.provenance.format,
-        instrument=m.provenance.instrument,
-        sample=m.provenance.sample,
-        date=m.provenance.date,
-        symmetry=m.symmetry,
-        rows=m.n_rows,
-        rows_used=int(rows.index.size),
-        left_out=list(rows.left_out),
-        notes=[DataNote(n.code, n.sentence, n.count) for n in m.notes],
-        reciprocity=None if reciprocity is None else DataReciprocity(*reciprocity),
-        albedo=[
-            DataAlbedo(math.degrees(t), a, c) for t, a, c in diagnostics.data_albedo(m)
-        ],
     )
 
 

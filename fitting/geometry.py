@@ -1,6 +1,7 @@
 """Directions as the models need them: components, computed once, never angles.
 
 ``wi`` points from the surface to the source, ``wo`` to the detector, z is the normal.
+A negative z component is the back of the sample: light that arrives there, or leaves it.
 Half vectors are formed here in float64 and stored, because ``sin^2(theta_h)`` taken from
 ``1 - cos^2`` loses every digit of a narrow peak in float32.
 """
@@ -53,17 +54,17 @@ class Geometry(eqx.Module):
     polar: PolarAngles | None = None
 
     def over_angles(self, function: Callable[[Array, Array], Array]) -> tuple[Array, Array]:
-        """``function(sin^2(theta), cos(theta))`` at the source's and detector's angles.
+        """``function(sin^2(theta), |cos(theta)|)`` at the source's and detector's angles.
 
         For costly functions of one polar angle: where the angles that occur are known,
         they are evaluated once each.
         """
         if self.polar is None:
             return (
-                function(self.wix**2 + self.wiy**2, self.cos_i),
-                function(self.wox**2 + self.woy**2, self.cos_o),
+                function(self.wix**2 + self.wiy**2, abs(self.cos_i)),
+                function(self.wox**2 + self.woy**2, abs(self.cos_o)),
             )
-        values = function(self.polar.sine2, self.polar.cosine)
+        values = function(self.polar.sine2, abs(self.polar.cosine))
         return values[self.polar.index_i], values[self.polar.index_o]
 
     @property
@@ -84,9 +85,50 @@ class Geometry(eqx.Module):
         )  # fmt: skip
 
     @property
+    def turned_over(self) -> Geometry:
+        """The same pairs with front and back of the sample exchanged: z reversed."""
+        return dataclasses.replace(self, cos_i=-self.cos_i, cos_o=-self.cos_o, hz=-self.hz)
+
+    @property
+    def from_front(self) -> tuple[Geometry, Array]:
+        """The pairs turned over where the light arrives at the back, and where that is."""
+        back = (self.cos_i < 0) | ((self.cos_i == 0) & (self.cos_o < 0))
+        lib = _library(self.cos_i, self.cos_o)
+        sign = lib.where(back, -1.0, 1.0).astype(self.cos_i.dtype)
+        front = dataclasses.replace(
+            self, cos_i=sign * self.cos_i, cos_o=sign * self.cos_o, hz=sign * self.hz
+        )
+        return front, back
+
+    @property
+    def unfolded(self) -> Geometry:
+        """The same sources with the detector mirrored at the plane of the surface.
+
+        Light that goes straight through is then light that is reflected like in a mirror.
+        The tangential part of ``wi + wo`` is taken from the stored half vector, which has
+        all its digits where the directions are nearly opposite.
+        """
+        lib = _library(self.cos_i, self.cos_o)
+        twice = 2.0 * self.cos_d
+        sx, sy, sz = twice * self.hx, twice * self.hy, self.cos_i - self.cos_o
+        hx, hy, hz, cos_d = _half(lib, sx, sy, sz)
+        return dataclasses.replace(
+            self, cos_o=-self.cos_o, hx=hx, hy=hy, hz=hz, cos_d=cos_d
+        )
+
+    @property
     def reflects(self) -> Array:
         """True where source and detector are both on the side of the normal."""
         return (self.cos_i >= 0) & (self.cos_o >= 0) & (self.cos_i + self.cos_o > 0)
+
+    @property
+    def transmits(self) -> Array:
+        """True where source and detector are on different sides.
+
+        The horizon belongs to reflection: a pair is never on both.
+        """
+        down = (self.cos_i > 0) & (self.cos_o < 0)
+        return down | ((self.cos_i < 0) & (self.cos_o > 0))
 
 
 def from_components(wix, wiy, wiz, wox, woy, woz) -> Geometry:
@@ -95,19 +137,30 @@ def from_components(wix, wiy, wiz, wox, woy, woz) -> Geometry:
     Differentiable in the directions everywhere but at ``wi = -wo``, where the gradient
     is zero.
     """
-    plain = all(isinstance(a, np.ndarray) for a in (wix, wiz, wox, woz))
-    lib: Any = np if plain else jnp
-    sx, sy, sz = wix + wox, wiy + woy, wiz + woz
+    lib = _library(wix, wiz, wox, woz)
+    hx, hy, hz, cos_d = _half(lib, wix + wox, wiy + woy, wiz + woz)
+    return Geometry(
+        wix=wix, wiy=wiy, cos_i=wiz, wox=wox, woy=woy, cos_o=woz,
+        hx=hx, hy=hy, hz=hz, cos_d=cos_d,
+    )  # fmt: skip
+
+
+def _library(*arrays: Any) -> Any:
+    """numpy where all arrays are numpy's, else JAX."""
+    return np if all(isinstance(a, np.ndarray) for a in arrays) else jnp
+
+
+def _half(lib: Any, sx, sy, sz) -> tuple:
+    """Unit vector and half length of ``wi + wo``."""
     norm2 = sx * sx + sy * sy + sz * sz
     defined = norm2 > 1e-24
     norm = lib.sqrt(lib.where(defined, norm2, 1.0))
-    return Geometry(
-        wix=wix, wiy=wiy, cos_i=wiz, wox=wox, woy=woy, cos_o=woz,
-        hx=lib.where(defined, sx / norm, 0.0),
-        hy=lib.where(defined, sy / norm, 0.0),
-        hz=lib.where(defined, sz / norm, 1.0),
-        cos_d=lib.where(defined, 0.5 * norm, 0.0),
-    )  # fmt: skip
+    return (
+        lib.where(defined, sx / norm, 0.0),
+        lib.where(defined, sy / norm, 0.0),
+        lib.where(defined, sz / norm, 1.0),
+        lib.where(defined, 0.5 * norm, 0.0),
+    )
 
 
 def from_angles(

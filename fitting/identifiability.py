@@ -92,14 +92,22 @@ def _exact(problems: list[Problem], ends: list[Solution]) -> list[str]:
 
 
 def _reciprocity(problems: list[Problem], penalties: list[float]) -> list[str]:
-    one_sided = any(not lobe.RECIPROCAL for p in problems for lobe in p.model.lobes)
-    if not one_sided or max(penalties) < _NOTICEABLE:
+    if all(p.model.reciprocal for p in problems):
         return []
-    return [
-        f"{percent(max(penalties))} of the cost is the penalty on what changes when "
-        "source and detector are exchanged, which pulls the fit away from the data; the "
-        "uncertainties are those of the data alone"
-    ]
+    out: list[str] = []
+    if all(lobe.RECIPROCAL for p in problems for lobe in p.model.lobes):
+        out.append(
+            "the lobes that transmit disagree on the media: some lie between different "
+            "indices, others not (lambert_transmission has the option 'media') or with an "
+            "index of their own (tie it), so that the sum is not reciprocal"
+        )
+    if max(penalties) >= _NOTICEABLE:
+        out.append(
+            f"{percent(max(penalties))} of the cost is the penalty on what changes when "
+            "source and detector are exchanged, which pulls the fit away from the data; "
+            "the uncertainties are those of the data alone"
+        )
+    return out
 
 
 def of_parameters(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any, get_args
 
 import equinox as eqx
 import jax
@@ -12,7 +13,9 @@ from jaxtyping import Array, ArrayLike
 from fitting import expression as expr
 from fitting.geometry import Geometry, from_angles
 from fitting.models import Lobe, lobe_class, lobe_names
+from fitting.models.lobe import THROUGH, Way
 from fitting.models.retro import Retro
+from fitting.models.turned_over import TurnedOver
 from fitting.parameters import Parameter
 
 Parameters = Mapping[str, ArrayLike]
@@ -58,6 +61,30 @@ class Model(eqx.Module):
         """Whether a lobe depends on the azimuth of the sample itself."""
         return any(p.scale == "periodic" for p in self.parameters().values())
 
+    @property
+    def ways(self) -> tuple[Way, ...]:
+        """The ways of light that one of the lobes knows."""
+        known = {w for lobe in self.lobes for w in lobe.ways}
+        return tuple(w for w in get_args(Way) if w in known)
+
+    @property
+    def reciprocal(self) -> bool:
+        """Whether whatever the parameters are: reciprocal lobes between the same media."""
+        through = [o for o in self.lobes if set(o.ways) & set(THROUGH)]
+        media = [o for o in through if _between_media(o)]
+        alike = len(media) == 0 or len(through) == 1
+        return alike and all(lobe.RECIPROCAL for lobe in self.lobes)
+
+    def relative_index(self, shape: Mapping[str, Any]) -> Array | float:
+        """Index of the medium behind the sample relative to the one in front.
+
+        Of the first lobe that lies between different media; 1 without one.
+        """
+        for i, lobe in enumerate(self.lobes):
+            if _between_media(lobe):
+                return lobe.relative_index(self.of_lobe(i, shape))
+        return 1.0
+
     def n_basis(self, index: int) -> int:
         """Number of basis functions of one lobe."""
         lobe = self.lobes[index]
@@ -65,7 +92,7 @@ class Model(eqx.Module):
         normal = from_angles([0.0], 0.0, [0.0], 0.0)
         return len(jax.eval_shape(lobe.basis, shape, normal))
 
-    def of_lobe(self, index: int, values: Mapping[str, Array]) -> dict[str, Array]:
+    def of_lobe(self, index: int, values: Mapping[str, Any]) -> dict[str, Any]:
         """The values of one lobe under their short names."""
         label = self.labels[index]
         return {
@@ -126,6 +153,12 @@ def _per_channel(model: Model, values: dict[str, Array], geometry: Geometry) -> 
     return jax.vmap(lambda one: model(one, geometry), out_axes=-1)(wide)
 
 
+def _between_media(lobe: Lobe) -> bool:
+    """Whether the lobe lets light into a medium of another index."""
+    shape = {p.name: p.default for p in lobe.parameters() if not p.coefficient}
+    return bool(lobe.relative_index(shape) != 1.0)  # pyright: ignore[reportArgumentType]
+
+
 def _make_lobe(term: expr.Term) -> Lobe:
     cls = lobe_class(term.lobe)
     known = expr.options_of(cls)
@@ -141,6 +174,7 @@ def _make_lobe(term: expr.Term) -> Lobe:
                 f"lobe {term.lobe!r}: of {', '.join(term.options)} more than one says its "
                 f"{field.replace('_', ' ')}"
             )
-    retro = options.pop("retro", False)
+    retro, back = options.pop("retro", False), options.pop("back", False)
     lobe = cls(**options)
-    return Retro(lobe) if retro else lobe
+    lobe = Retro(lobe) if retro else lobe
+    return TurnedOver(lobe) if back else lobe

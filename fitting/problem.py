@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import jax
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 from data_formats import Measurement, MeasurementError
 from fitting import geometry, objectives
 from fitting.model import Model
+from fitting.models import Way
 from fitting.objectives import OBJECTIVES
 from fitting.options import FitOptions
 from fitting.reduced import Problem
@@ -28,6 +30,31 @@ _SAME_ANGLE = 1e-10
 _MOST_ANGLES = 512
 
 
+_NO_LOBE: dict[Way, str] = {
+    "front": "rows of light reflected at the front, for which the model has no lobe",
+    "back": "rows of light reflected at the back (theta_i > 90 deg), for which the model "
+    "has no lobe (the option 'back' makes one)",
+    "down": "transmitted rows (theta_r > 90 deg), for which the model has no lobe (such as "
+    "lambert_transmission)",
+    "up": "transmitted rows lit from the back (theta_i > 90 deg), for which the model has "
+    "no lobe (such as lambert_transmission)",
+}
+
+
+def ways_of(measurement: Measurement) -> np.ndarray:
+    """``(n,)`` the way of light of every row, as lobes name them."""
+    through, back = measurement.transmitted, measurement.from_back
+    # Of grazing light the detector tells the side.
+    back = back | (~through & (measurement.theta_r > 0.5 * math.pi + 1e-9))
+    reflected = np.where(back, "back", "front")
+    return np.where(through, np.where(back, "up", "down"), reflected)
+
+
+def _from_normal(theta: np.ndarray) -> np.ndarray:
+    """Angle to the normal of the side that a direction is on, rad."""
+    return np.minimum(theta, math.pi - theta)
+
+
 @dataclass(frozen=True)
 class Rows:
     """The rows that a fit uses, as plain arrays, and why others were left out."""
@@ -39,28 +66,30 @@ class Rows:
     sigma: np.ndarray | None
     solid_angle: np.ndarray
     left_out: tuple[str, ...]
+    way: np.ndarray
     fitted: np.ndarray | None = None
 
 
-def select_rows(measurement: Measurement, max_theta_deg: float) -> Rows:
-    """Rows that a reflection model can be compared with.
+def select_rows(
+    measurement: Measurement, max_theta_deg: float, ways: Sequence[Way] = ("front",)
+) -> Rows:
+    """Rows that a model can be compared with which knows these ways of light.
 
     Raises `MeasurementError` if none is left.
     """
     m = measurement
     limit = math.radians(max_theta_deg) + 1e-6
-    horizon = 0.5 * math.pi + 1e-6
-    from_below = m.theta_i > horizon
-    below = ~from_below & (m.theta_r > horizon)
-    grazing = ~below & ~from_below & ((m.theta_i > limit) | (m.theta_r > limit))
-    empty = ~below & ~from_below & ~grazing & ~m.valid.any(axis=1)
-    keep = ~below & ~from_below & ~grazing & ~empty
-    reasons = (
-        (from_below, "rows lit from behind (theta_i > 90 deg), which are not fitted"),
-        (below, "transmitted rows (theta_r > 90 deg), which a BRDF does not describe"),
+    steepest = np.maximum(_from_normal(m.theta_i), _from_normal(m.theta_r))
+    way = ways_of(m)
+    unknown = ~np.isin(way, ways)
+    grazing = ~unknown & (steepest > limit)
+    empty = ~unknown & ~grazing & ~m.valid.any(axis=1)
+    keep = ~unknown & ~grazing & ~empty
+    reasons = [(unknown & (way == w), text) for w, text in _NO_LOBE.items()]
+    reasons += [
         (grazing, f"rows beyond the grazing cut-off of {max_theta_deg:g} deg"),
         (empty, "rows without a valid value"),
-    )
+    ]
     left_out = tuple(f"{int(r.sum())} {text}" for r, text in reasons if r.any())
     if not keep.any():
         raise MeasurementError(
@@ -82,6 +111,7 @@ def select_rows(measurement: Measurement, max_theta_deg: float) -> Rows:
         sigma=None if m.sigma is None else m.sigma[keep],
         solid_angle=solid_angle_weights(*angles),
         left_out=left_out,
+        way=way[keep],
     )
 
 
@@ -107,7 +137,9 @@ def residual_terms(rows: Rows, objective: str, options: FitOptions) -> Terms:
     spec = OBJECTIVES[objective]
     value = np.where(rows.valid, rows.value, 0.0).T
     valid = rows.valid.T
-    kappa = np.asarray(rows.geometry.cos_o) if spec.cosine else np.ones(value.shape[1])
+    kappa = (
+        np.abs(np.asarray(rows.geometry.cos_o)) if spec.cosine else np.ones(value.shape[1])
+    )
     if spec.scaled:
         size = np.median(np.abs(value * kappa)[valid])
         kappa = kappa / (size if size > 0 else 1.0)
@@ -196,7 +228,7 @@ def prepare(
         energy_weight=_float64(energy * scale / n_channels),
         reciprocity_weight=_float64(options.reciprocity * scale / n_channels),
         scale=_float64(scale),
-        pairs=jax.tree.map(_float64, reciprocity_pairs()),
+        pairs=jax.tree.map(_float64, reciprocity_pairs(model.ways)),
     )
 
 
@@ -265,12 +297,21 @@ def bucket(n: int) -> int:
     return math.ceil(chunks / step) * step * _CHUNK
 
 
-def reciprocity_pairs() -> geometry.Geometry:
-    """Quasi-random pairs of directions, even in projected solid angle of both."""
+def reciprocity_pairs(ways: Sequence[Way] = ("front",)) -> geometry.Geometry:
+    """Quasi-random pairs of directions, even in projected solid angle of both.
+
+    In turn for every way of light; those from back to front are the others exchanged.
+    """
     n = np.arange(_RECIPROCITY_PAIRS) + 0.5
     # Generalised golden ratio in four dimensions: the root of x^5 = x + 1.
     base = 1.1673039782614187
     a, b, c, d = (np.mod(n * base ** -(k + 1), 1.0) for k in range(4))
+    theta_i, theta_r = np.arcsin(np.sqrt(a)), np.arcsin(np.sqrt(c))
+    known = [w for w in ways if w != "up"] or ["down"]
+    way = np.asarray(known)[np.arange(n.size) % len(known)]
     return geometry.from_angles(
-        np.arcsin(np.sqrt(a)), 2 * np.pi * b, np.arcsin(np.sqrt(c)), 2 * np.pi * d
+        np.where(way == "back", np.pi - theta_i, theta_i),
+        2 * np.pi * b,
+        np.where(way == "front", theta_r, np.pi - theta_r),
+        2 * np.pi * d,
     )

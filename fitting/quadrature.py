@@ -14,7 +14,8 @@ from fitting.geometry import Geometry, from_components
 from fitting.models.lobe import AxisPeak, SlopeWidths
 
 
-def _detector(mu: Array, azimuth: Array) -> tuple[Array, Array]:
+def tangential(mu: Array, azimuth: Array) -> tuple[Array, Array]:
+    """x and y of a direction by its cosine and azimuth."""
     sine = jnp.sqrt((1.0 - mu) * (1.0 + mu))
     return sine * jnp.cos(azimuth), sine * jnp.sin(azimuth)
 
@@ -51,7 +52,7 @@ def over_half_vector(
     the quarters meet. Where the lobe is round, half a circle stands for both.
     """
     dtype = mu.dtype
-    x_o, y_o = _detector(mu, azimuth)
+    x_o, y_o = tangential(mu, azimuth)
     ax, ay, angle = widths
     ca, sa = jnp.cos(angle), jnp.sin(angle)
     phi, dphi = _quarters(nodes // 2, 4 if full_circle else 2)
@@ -101,7 +102,7 @@ def over_axis(
     atan2(c, s cos(psi))``.
     """
     dtype = mu.dtype
-    x_o, y_o = _detector(mu, azimuth)
+    x_o, y_o = tangential(mu, azimuth)
     sine = jnp.sqrt((1.0 - mu) * (1.0 + mu))
     along, up = peak.c_xy * sine, peak.c_z * mu
     length = jnp.sqrt(along * along + up * up)
@@ -134,7 +135,7 @@ def over_source(mu: Array, azimuth: Array, nodes: int) -> tuple[Geometry, Array]
     polar angle and at quarter turns from it, where diffuse lobes have their kinks.
     """
     dtype = mu.dtype
-    x_o, y_o = _detector(mu, azimuth)
+    x_o, y_o = tangential(mu, azimuth)
     x, w = unit_nodes(nodes // 2)
     x, w = jnp.asarray(x, dtype)[:, None], jnp.asarray(w, dtype)[:, None]
     middle = jnp.arccos(mu)

@@ -108,7 +108,11 @@ class CrossValidation(msgspec.Struct, frozen=True):
 
 
 class Energy(msgspec.Struct, frozen=True):
-    """Largest directional albedo of the fit on a dense grid, and what was done about it."""
+    """Largest directional albedo of the fit on a dense grid, and what was done about it.
+
+    Of a model with transmission it is what is reflected and transmitted together, for
+    light from the ``side``; ``transmitted`` is the transmitted part.
+    """
 
     max_albedo: float
     theta_deg: float
@@ -116,10 +120,13 @@ class Energy(msgspec.Struct, frozen=True):
     constraint: str
     weight: float | None
     active: bool
+    side: str = "front"
+    transmitted: float = 0.0
 
 
 class Reciprocity(msgspec.Struct, frozen=True):
-    """Largest relative difference of f(wi, wo) and f(wo, wi) on independent pairs."""
+    """Largest relative difference of f(wi, wo) / n_o^2 and f(wo, wi) / n_i^2 on
+    independent pairs, with the indices of the media on both sides."""
 
     max_relative_difference: float
     by_construction: bool
@@ -127,21 +134,31 @@ class Reciprocity(msgspec.Struct, frozen=True):
 
 
 class DataReciprocity(msgspec.Struct, frozen=True):
-    """Median relative difference of exchanged directions in the data, by interpolation."""
+    """Median relative difference of exchanged directions in the data, by interpolation.
+
+    Of transmitted light it is that of f / n_o^2, with ``relative_index``, the index behind
+    the sample relative to the one in front.
+    """
 
     median_relative_difference: float
     pairs: int
+    relative_index: float = 1.0
 
 
 class DataAlbedo(msgspec.Struct, frozen=True):
-    """Albedo of the data by summation, the largest over channels, per incidence.
+    """Albedo of the data by summation, for the channel where it is largest, per incidence.
 
-    ``covered`` is the share of the projected hemisphere that the rows stand for.
+    ``covered`` is the share of the projected hemisphere that the rows stand for. With
+    transmitted rows ``albedo`` is the sum of both, and ``transmitted`` the part that goes
+    through, over the share ``transmitted_covered``. ``theta_i_deg`` is above 90 for light
+    from the back.
     """
 
     theta_i_deg: float
     albedo: float
     covered: float
+    transmitted: float | None = None
+    transmitted_covered: float | None = None
 
 
 class DataNote(msgspec.Struct, frozen=True):
@@ -168,6 +185,7 @@ class Data(msgspec.Struct, frozen=True):
     notes: list[DataNote]
     reciprocity: DataReciprocity | None
     albedo: list[DataAlbedo]
+    reciprocity_transmitted: DataReciprocity | None = None
 
 
 class Settings(msgspec.Struct, frozen=True):

@@ -10,6 +10,7 @@ import numpy as np
 from data_formats import Measurement
 from fitting import judge
 from fitting.expression import ModelError
+from fitting.model import Model
 from fitting.options import FitOptions
 from fitting.problem import select_rows, with_noise_of
 from fitting.result import AngleError, ChannelError, FitResult, Scores, Settings
@@ -39,7 +40,7 @@ def score(measurement: Measurement, result: FitResult) -> Score:
             f"{_short(theirs)}; they must be the same"
         )
     options = options_of(result.settings)
-    rows = select_rows(measurement, options.max_theta_deg)
+    rows = select_rows(measurement, options.max_theta_deg, Model(result.model).ways)
     at = rows.index
     predicted = result.evaluate(
         measurement.theta_i[at], measurement.phi_i[at],

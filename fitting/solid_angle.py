@@ -19,11 +19,13 @@ def solid_angle_weights(
     the mid-angles to the neighbouring rings, times the mid-azimuths to its neighbours on
     the ring. Scattered directions, where rings hold less than three rows on average, get
     the squared distance to their nearest neighbours instead. Each incidence direction
-    has the same mean. Repeated directions share their weight.
+    has the same mean, on each side of the sample. Repeated directions share their weight.
     """
     polar = incidence_labels(theta_i)
-    azimuth = angle_labels(np.where(theta_i > _SAME_ANGLE, phi_i, 0.0))
-    incidence = polar * (azimuth.max(initial=0) + 1) + azimuth
+    azimuth = angle_labels(np.where(np.sin(theta_i) > _SAME_ANGLE, phi_i, 0.0))
+    below = theta_r > 0.5 * np.pi + 1e-9
+    theta_r = np.where(below, np.pi - theta_r, theta_r)
+    incidence = 2 * (polar * (azimuth.max(initial=0) + 1) + azimuth) + below
     weights = np.empty(theta_i.size)
     for label in np.unique(incidence):
         rows = np.flatnonzero(incidence == label)

@@ -10,6 +10,7 @@ import re
 import jax.numpy as jnp
 import numpy as np
 
+from fitting.albedo import LEAVING, lit_sides
 from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions, Value
@@ -198,33 +199,20 @@ def _constraints(
             rows.append(-unit)
             limits.append(-high * ones)
     if options.energy == "hard":
-        # With every lobe's albedo at most its bound times its largest coefficient, it is
-        # enough that the sum over lobes of any one of these each stays below 1.
-        groups: list[list[tuple[int, float]]] = []
-        for label, lobe in zip(model.labels, model.lobes, strict=True):
-            if lobe.albedo_bound is None:
-                raise ModelError(
-                    f"energy 'hard' needs lobes of bounded albedo; {label} has no bound"
-                )
-            own = [
-                i
-                for i, n in enumerate(names)
-                if n.rpartition(".")[0] == label and declared[n].amplitude
-            ]
-            groups.append([(i, lobe.albedo_bound) for i in own])
-        for choice in itertools.product(*groups):
+        sources = dict(zip(names, zip(source, constant, strict=True), strict=True))
+        lows = [_ends(bounds.get(n), declared[n])[0] for n in free]
+        for choice in _albedo_bounds(model, names):
             row, limit, least = np.zeros(len(free)), -ones, 0.0 * ones
-            for i, bound in choice:
-                index, factor = source[i]
+            for name, bound in choice:
+                (index, factor), value = sources[name]
                 if index >= 0:
                     row[index] -= bound * factor
-                    low = _ends(bounds.get(free[index]), declared[free[index]])[0]
-                    least = least + bound * factor * max(low, 0.0)
+                    least = least + bound * factor * max(lows[index], 0.0)
                 else:
-                    limit = limit + bound * constant[i]
-                    least = least + bound * constant[i]
+                    limit = limit + bound * value
+                    least = least + bound * value
             if np.any(least > 1.0 + 1e-12):
-                total = " + ".join(names[i] for i, _ in choice)
+                total = " + ".join(name for name, _ in choice)
                 raise ModelError(
                     f"energy 'hard' cannot hold: {total} is "
                     f"at least {least.max():g} by what is fixed or bounded; it must be "
@@ -236,3 +224,27 @@ def _constraints(
     if not rows:
         return np.zeros((0, len(free))), np.zeros((constant.shape[1], 0))
     return np.stack(rows), np.stack(limits, axis=1)
+
+
+def _albedo_bounds(model: Model, names: list[str]) -> list[tuple[tuple[str, float], ...]]:
+    """Coefficients with factors whose sum bounds the albedo for light from one side.
+
+    With every lobe's albedo at most its bound times its largest coefficient, it is enough
+    that the sum over lobes of any one of these each stays below 1.
+    """
+    declared = model.parameters()
+    out: dict[tuple[tuple[str, float], ...], None] = {}
+    for side in lit_sides(model):
+        groups: list[list[tuple[str, float]]] = []
+        for label, lobe in zip(model.labels, model.lobes, strict=True):
+            if not set(lobe.ways) & set(LEAVING[side]):
+                continue
+            bound = lobe.albedo_bound
+            if bound is None:
+                raise ModelError(
+                    f"energy 'hard' needs lobes of bounded albedo; {label} has no bound"
+                )
+            own = [n for n in names if n.rpartition(".")[0] == label]
+            groups.append([(n, bound) for n in own if declared[n].amplitude])
+        out |= dict.fromkeys(itertools.product(*groups))
+    return list(out)

@@ -95,7 +95,7 @@ def test_albedo_of_dense_data_is_that_of_the_model(full_circle):
     theta_r = np.radians(np.arange(0.25, 90, 0.5))
     grid = np.array([(0.8, 0.3, t, 0.3 + p) for t in theta_r for p in azimuths]).T
     m = synthetic.measurement("lambert + ggx", values, angles=tuple(grid))
-    ((theta, albedo, covered),) = diagnostics.data_albedo(m)
+    ((theta, albedo, covered, *_),) = diagnostics.data_albedo(m)
     model = Model("lambert + ggx")
     with jax.enable_x64(True):
         exact = model_albedo(model, model.defaults() | values, [np.cos(0.8)], nodes=64)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import importlib
 from importlib.metadata import entry_points
 
-from fitting.models.lobe import AxisPeak, Lobe, Peak, Shape, SlopeWidths
+from fitting.models.lobe import AxisPeak, Lobe, Passage, Peak, Shape, SlopeWidths, Way
 
 __all__ = [
     "LOBES",
     "AxisPeak",
     "Lobe",
+    "Passage",
     "Peak",
     "Shape",
     "SlopeWidths",
+    "Way",
     "lobe_class",
     "lobe_names",
 ]
@@ -48,6 +50,11 @@ LOBES: dict[str, str] = {
     "rpv": "RPV",
     "rtls": "RTLS",
     "hapke": "Hapke",
+    # Transmission, and what belongs to it.
+    "lambert_transmission": "LambertTransmission",
+    "rough_dielectric": "RoughDielectric",
+    "thin_slab": "ThinSlab",
+    "smooth_slab": "SmoothSlab",
     # Materials of renderers, to convert a fit to.
     "disney": "Disney",
     "openpbr": "OpenPBR",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -151,6 +151,51 @@ def dielectric(cos_d: Array, eta: Array) -> Array:
     rs = less / both
     rp_rs = (cos_d * both - 1.0) / jnp.where(total, 1.0, cos_d * less + 1.0)
     return jnp.where(total, 1.0, 0.5 * rs * rs * (1.0 + rp_rs * rp_rs))
+
+
+class Interface(NamedTuple):
+    """A smooth interface, both polarisations apart, and the cosine behind it."""
+
+    reflected_s: Array
+    reflected_p: Array
+    transmitted_s: Array
+    transmitted_p: Array
+    cos_t: Array
+
+    @property
+    def reflected(self) -> Array:
+        """For unpolarised light."""
+        return 0.5 * (self.reflected_s + self.reflected_p)
+
+    @property
+    def transmitted(self) -> Array:
+        """For unpolarised light, ``1 - reflected`` without its cancellation."""
+        return 0.5 * (self.transmitted_s + self.transmitted_p)
+
+
+def dielectric_terms(cos_d: Array, eta: Array) -> Interface:
+    """Reflectance and transmittance of an interface to a denser medium, ``eta > 1``.
+
+    With ``c = cos_d`` and ``g = eta cos_t = sqrt(eta^2 - 1 + c^2)`` (Born and Wolf, sec.
+    1.5.2)::
+
+        R_s = ((g - c) / (g + c))^2            T_s = 4 c g / (g + c)^2
+        R_p = ((eta^2 c - g) / (eta^2 c + g))^2    T_p = 4 eta^2 c g / (eta^2 c + g)^2
+    """
+    step = (eta - 1.0) * (eta + 1.0)
+    g = jnp.sqrt(step + cos_d * cos_d)
+    eta2 = eta * eta
+    total_s, total_p = g + cos_d, eta2 * cos_d + g
+    # (eta^2 c - g) = (eta^2 - 1) (c^2 (eta^2 + 1) - 1) / (eta^2 c + g), without the
+    # cancellation of an index next to 1.
+    across = step * (cos_d * cos_d * (eta2 + 1.0) - 1.0) / total_p
+    return Interface(
+        reflected_s=(step / total_s / total_s) ** 2,
+        reflected_p=(across / total_p) ** 2,
+        transmitted_s=4.0 * cos_d * g / total_s**2,
+        transmitted_p=4.0 * eta2 * cos_d * g / total_p**2,
+        cos_t=g / eta,
+    )
 
 
 def conductor(cos_d: Array, eta: Array, k: Array) -> Array:

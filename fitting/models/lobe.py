@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import equinox as eqx
 from jaxtyping import Array, Float
@@ -37,6 +37,26 @@ class AxisPeak(NamedTuple):
 Peak = SlopeWidths | AxisPeak | None
 
 
+class Passage(NamedTuple):
+    """Where transmitted light peaks: at facets of these widths, which refract it.
+
+    ``eta`` is the index of the medium behind the surface relative to the one in front.
+    Without it the peak is straight on, the mirror image of one of reflected light.
+    """
+
+    widths: SlopeWidths
+    eta: Float[Array, ""] | None = None
+
+
+# The ways of light: reflected at the front or at the back of the sample, and through it
+# from front to back or from back to front.
+Way = Literal["front", "back", "down", "up"]
+FROM_FRONT: tuple[Way, ...] = ("front", "down")
+FROM_BACK: tuple[Way, ...] = ("back", "up")
+THROUGH: tuple[Way, ...] = ("down", "up")
+TURNED_OVER: dict[Way, Way] = {"front": "back", "back": "front", "down": "up", "up": "down"}
+
+
 class Lobe(eqx.Module):
     """One term of a model: ``f = sum_j amplitude_j(coefficients, shape) basis_j(shape)``.
 
@@ -45,12 +65,14 @@ class Lobe(eqx.Module):
 
     - ``NAME``: how users write it in a model expression.
     - ``REFERENCE``: the paper, to the equation number.
-    - ``RECIPROCAL``: whether ``f(wi, wo) = f(wo, wi)`` for all parameters.
+    - ``WAYS``: the ways of light that it knows; on others its basis functions are zero.
+    - ``RECIPROCAL``: whether ``f(wi, wo) / n_o^2 = f(wo, wi) / n_i^2`` for all parameters,
+      ``n_i, n_o`` being the indices of the media of source and detector.
     - ``LINEAR``: whether the amplitudes are the coefficients themselves, so that the best
       coefficients of a quadratic objective follow from the shape in closed form; an
       option may make them nonlinear, which `linear` tells.
-    - ``ALBEDO_BOUND``: an upper bound of the directional albedo with the largest
-      coefficient at 1, or None where there is none.
+    - ``ALBEDO_BOUND``: an upper bound of the directional albedo, reflected and transmitted
+      light together, with the largest coefficient at 1, or None where there is none.
     - ``NONNEGATIVE``: whether no basis function is ever below zero.
     - ``RETRO``: whether the option ``retro`` makes sense, which turns the peak around.
     - ``PER_ANGLE``: whether it calls `Geometry.over_angles`, so that a table of the polar
@@ -59,12 +81,18 @@ class Lobe(eqx.Module):
 
     NAME: ClassVar[str]
     REFERENCE: ClassVar[str]
+    WAYS: ClassVar[tuple[Way, ...]] = ("front",)
     RECIPROCAL: ClassVar[bool]
     LINEAR: ClassVar[bool]
     ALBEDO_BOUND: ClassVar[float | None]
     NONNEGATIVE: ClassVar[bool] = True
     RETRO: ClassVar[bool] = False
     PER_ANGLE: ClassVar[bool] = False
+
+    @property
+    def ways(self) -> tuple[Way, ...]:
+        """`WAYS`, as this lobe lies in the sample."""
+        return self.WAYS
 
     @property
     def linear(self) -> bool:
@@ -89,8 +117,8 @@ class Lobe(eqx.Module):
     def basis(self, shape: Shape, geometry: Geometry) -> tuple[Array, ...]:
         """The basis functions, 1/sr, each of the shape of the geometry's arrays.
 
-        Finite, with finite derivatives, over the whole closed domain; zero where the
-        source or the detector is below the horizon.
+        Finite, with finite derivatives, over the whole closed domain; zero on the ways of
+        light that are not among `WAYS`, such as below the horizon.
         """
 
     @abc.abstractmethod
@@ -102,3 +130,14 @@ class Lobe(eqx.Module):
     @abc.abstractmethod
     def peak(self, shape: Shape) -> Peak:
         """Where the albedo's quadrature needs its nodes; None for a broad, smooth lobe."""
+
+    def passage(self, shape: Shape) -> Passage | None:
+        """Where transmitted light peaks and needs nodes; None if it is broad."""
+        return None
+
+    def relative_index(self, shape: Shape) -> Array | float:
+        """Index of the medium behind the surface relative to the one in front of it.
+
+        For the reciprocity of transmitted light. Walter et al. 2007, sec. 4.2.
+        """
+        return 1.0

@@ -81,7 +81,7 @@ def check(anisotropic: bool, options: Options) -> None:
 
 def basis(options: Options, facets: Facets, shape: Shape, g: Geometry) -> tuple[Array, ...]:
     """``D(h) V F(cos_d)`` split by Fresnel's coefficients (Walter et al. 2007, eq. 20)."""
-    single = _single(options, facets, shape)
+    single = single_scattering(options.shadowing, facets, shape)
     terms = fresnel.split(options.fresnel, shape, single(g), g.cos_d)
     if not options.multiple_scattering:
         return terms
@@ -96,7 +96,8 @@ def amplitudes(
     direct = fresnel.amplitudes(options.fresnel, coefficients)
     if not options.multiple_scattering:
         return direct
-    lost = multiple_scattering.Lost(_single(options, facets, shape), shape["alpha"])
+    single = single_scattering(options.shadowing, facets, shape)
+    lost = multiple_scattering.Lost(single, shape["alpha"])
     average = fresnel.average(options.fresnel, shape, coefficients)
     return (*direct, lost.amplitude(average))
 
@@ -106,7 +107,9 @@ def linear(options: Options) -> bool:
     return fresnel.linear(options.fresnel) and not options.multiple_scattering
 
 
-def _single(options: Options, facets: Facets, shape: Shape) -> Callable[[Geometry], Array]:
+def single_scattering(
+    kind: shadowing.Shadowing, facets: Facets, shape: Shape
+) -> Callable[[Geometry], Array]:
     """Single scattering of facets that reflect everything, ``D V``, 1/sr."""
 
     def value(g: Geometry) -> Array:
@@ -120,7 +123,7 @@ def _single(options: Options, facets: Facets, shape: Shape) -> Callable[[Geometr
             a2 = shape["alpha"] ** 2
             return g.over_angles(lambda sine2, c: facets.cos_lambda(sine2 * a2, c))
 
-        v = shadowing.visibility(options.shadowing, g, up, cos_lambda)
+        v = shadowing.visibility(kind, g, up, cos_lambda)
         return jnp.where(up, d * v, 0.0)
 
     return value
