@@ -9,8 +9,8 @@ The de-facto format of gonioreflectometers (Cornell, Light Tec Mini-Diff):
     0.5235988,0,0.5235988,3.1415927,0.31,0.35
     0.5235988,0,0.7853982,3.1415927,0.22,0.24
 
-Angles are radians and values 1/sr, unless found otherwise; wavelengths are in the names of
-the columns. Source: ASTM E1392-96, "Angle resolved optical scatter measurements on specular
+Angles are radians and values 1/sr, unless found otherwise; `theta` beyond 90 degrees is
+behind the surface. Wavelengths are in the names of the columns. Source: ASTM E1392-96, "Angle resolved optical scatter measurements on specular
 or diffuse surfaces", and the files written after it.
 """
 
@@ -66,7 +66,8 @@ def read(
     - `strict`: whether a wrong or missing `NUM_POINTS` is an error instead of a note.
     - `degrees`: the unit of the angles; `None`: find out.
     - `quantity`: `"brdf"`, `"btdf"`, `"bsdf"` in 1/sr, or `"brf"`, `"btf"`: reflectance or
-        transmittance factors, to be divided by pi; `None`: as the header says, else 1/sr.
+        transmittance factors, to be divided by pi; `None`: as the header says, else 1/sr
+        (`quantity=brdf` overrules a header that speaks of BRF).
     - `side`: `"transmitted"`: all is transmitted light, and a `theta_r` written on the
         source's side is read as `180 - theta_r`; `"as-written"`: keep it;
         `None`: as the header says.

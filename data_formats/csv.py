@@ -6,7 +6,8 @@ names (`theta_s`, `sza`, `vza`, `Incident_angle`, ...), with a unit or without
 called as in E1392 files: `450nm`, `0.45um`, `R`, `brdf`; `sigma_450nm` or `sigma` is their
 standard uncertainty. The separator is a comma, a semicolon, a TAB or blanks. A table with
 two angles only is in the plane of incidence, with a signed receiver angle that is positive
-on the specular side.
+on the specular side. Angles `theta` beyond 90 degrees are behind the surface. Lines above
+the header row that say BRF or BTDF are believed, with a note.
 """
 
 from __future__ import annotations
@@ -71,7 +72,8 @@ def read(
     - `path`: of the file; gzip is unpacked.
     - `degrees`: the unit of angles whose column does not state it; `None`: find out.
     - `quantity`: `"brdf"`, `"btdf"`, `"bsdf"` in 1/sr, or `"brf"`, `"btf"`: reflectance or
-        transmittance factors, to be divided by pi; `None`: as the header says, else 1/sr.
+        transmittance factors, to be divided by pi; `None`: as the header says, else 1/sr
+        (`quantity=brdf` overrules a header that speaks of BRF).
     - `side`: `"transmitted"`: all is transmitted light, and a `theta_r` written on the
         source's side is read as `180 - theta_r`; `"as-written"`: keep it;
         `None`: as the header says.

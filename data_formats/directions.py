@@ -17,7 +17,9 @@ Where = Callable[[int], str]
 # Angles printed with few digits may end slightly beyond 90 degrees.
 _SLACK = 1e-3
 # 90 degrees in radians, as files with few digits print it.
-_PRINTED = np.array([round(np.pi / 2, digits) for digits in range(3, 11)])
+_PRINTED = np.array([round(np.pi / 2, digits) for digits in range(3, 7)])
+# rad; what float32 leaves of a vector on the horizon.
+_ROUNDING = 1e-6
 # rad; as for `Measurement.transmitted`.
 _ON_HORIZON = 1e-9
 
@@ -117,8 +119,8 @@ def _in_degrees(raw: Angles, where: Where) -> bool:
 def snap_to_edges(raw: Angles, where: Where, notes: list[Note]) -> Angles:
     """Check the ranges of theta; put rounding beyond 90 and 180 degrees back on them.
 
-    In a column with directions on both sides of the horizon a small excess is taken for
-    rounding only if it is 90 degrees as printed with few digits: 1.571, 1.5708, ...
+    In a column with directions on both sides of the horizon an excess of more than 1e-6 is
+    taken for rounding only if it is 90 degrees as printed with few digits: 1.571, 1.5708.
 
     **Raises:** `MeasurementError` with file and line of a theta outside [0, pi].
     """
@@ -136,8 +138,8 @@ def snap_to_edges(raw: Angles, where: Where, notes: list[Note]) -> Angles:
             )
         over = (theta > np.pi / 2) & (theta <= np.pi / 2 + _SLACK)
         if (theta > np.pi / 2 + _SLACK).any():
-            printed = np.abs(theta[over, None] - _PRINTED).min(axis=1, initial=1) < 1e-12
-            over[over] = printed
+            printed = np.abs(theta[:, None] - _PRINTED).min(axis=1) < 1e-12
+            over &= printed | (theta <= np.pi / 2 + _ROUNDING)
         for near, edge in ((over, np.pi / 2), (theta > np.pi, np.pi)):
             # A float64's rounding needs no mention; a file's few digits do.
             snapped += int(np.count_nonzero(near & (theta > edge + 1e-9)))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Literal, get_args
 
 from data_formats.measurement import MeasurementError
@@ -18,7 +19,7 @@ from data_formats.provenance import one_line
 Quantity = Literal["bsdf", "brdf", "btdf", "brf", "btf"]
 Side = Literal["transmitted", "as-written"]
 
-_MOST_CHARACTERS = 2000
+_MOST_CHARACTERS, _MOST_LINES = 2000, 1000
 
 
 def _words(pattern: str) -> re.Pattern[str]:
@@ -45,7 +46,7 @@ _ASIDE = _words(
 _ABOUT_VALUES = frozenset(
     [
         *["quantity", "unit", "units", "value", "values", "valueunit", "valueunits"],
-        *["measname", "meastype", "measurement", "measurementtype", "datatype", "type"],
+        *["measname", "meastype", "measurement", "measurementtype", "datatype"],
         *["scattertype", "mode", "side"],
     ]
 )
@@ -129,9 +130,9 @@ def _stated(header: Mapping[str, str], names: Sequence[str]) -> Reading:
     decisive = [name[:_MOST_CHARACTERS] for name in names]
     lines: list[str] = []
     mentioned: list[str] = []
-    for key, text in header.items():
+    for key, text in islice(header.items(), _MOST_LINES):
         if key in ("preamble", "comments"):
-            lines += map(_without_paths, text.split("\n"))
+            lines += map(_without_paths, text.split("\n", _MOST_LINES)[:_MOST_LINES])
             continue
         line = _without_paths(f"{key} {text}")
         if _is_about_values(key):

@@ -183,6 +183,7 @@ WORDS = st.sampled_from(
             "1e999",
         ],
         *["nan", "inf", "1.#IND", "1,5", "0,5", ".", "1e308", "1e-320", "2", "450", "550"],
+        *["MEAS_NAME ", "BTDF", "BRF", "quantity: ", "transmittance factor", "3"],
         *["\0", "\ufeff", "é", "\u2028", "#DIM", "OPTIS - ", "\ud7ff", "9" * 30],
     ]
 )
@@ -268,6 +269,10 @@ def sound_files(tmp_path, write_astm, shadowed_rows, ramped_rows) -> list[Path]:
     files = [cornell.rename(folder / "cornell.astm")]
     leds = write_astm(ramped_rows, "theta_i,phi_i,theta_s,465nm,525nm,630nm")
     files.append(leds.rename(folder / "ramp.astm"))
+    leds = write_astm(
+        ramped_rows, "theta_i,phi_i,theta_s,465nm,525nm,630nm", ("MEAS_NAME BTDF",)
+    )
+    files.append(leds.rename(folder / "folded.astm"))
     for name in ("own.astm", "own.csv", "own.h5", "own.astm.gz"):
         data_formats.write(m, folder / name)
         files.append(folder / name)
