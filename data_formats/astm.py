@@ -10,8 +10,9 @@ The de-facto format of gonioreflectometers (Cornell, Light Tec Mini-Diff):
     0.5235988,0,0.7853982,3.1415927,0.22,0.24
 
 Angles are radians and values 1/sr, unless found otherwise; `theta` beyond 90 degrees is
-behind the surface. Wavelengths are in the names of the columns. Source: ASTM E1392-96, "Angle resolved optical scatter measurements on specular
-or diffuse surfaces", and the files written after it.
+behind the surface. Wavelengths are in the names of the columns. Source: ASTM E1392-96,
+"Angle resolved optical scatter measurements on specular or diffuse surfaces", and the files
+written after it.
 """
 
 from __future__ import annotations

@@ -157,7 +157,7 @@ def ramp_to_grazing(measurement: Measurement) -> Measurement:
     count = int(np.count_nonzero(masked))
     note = Note(
         "ramp-masked",
-        f"{count} rows less than 15 degrees above the surface are a straight ramp to zero, "
+        f"{count} rows less than 15 degrees off the surface are a straight ramp to zero, "
         "not a measurement; masked",
         count,
     )

@@ -2,7 +2,8 @@
 
 `#` begins a comment. All else is one stream of numbers, whatever the line breaks: `n`, then
 `n` wavelengths in nm, then records `theta_i phi_i theta_o phi_o v_1 ... v_n`, in radians
-and 1/sr; theta beyond pi/2 is behind the surface. Source: `src/materials/measured.cpp` of pbrt-v2.
+and 1/sr; theta beyond pi/2 is behind the surface. Source: `src/materials/measured.cpp` of
+pbrt-v2.
 """
 
 from __future__ import annotations

@@ -140,7 +140,7 @@ def _on_its_side(angles: Angles, how: Reading, path: str, notes: list[Note]) -> 
             Note(
                 "folded-transmission",
                 f"The values are of transmitted light ({how.transmitted}), but theta_r is "
-                f"on the source's side in all of {n_same} rows: read as 180 degrees - "
+                f"on the source's side in all {n_same} rows: read as 180 degrees - "
                 "theta_r; side='as-written' keeps it",
                 n_same,
             )
