@@ -26,6 +26,7 @@ Convention = Literal["radiance", "importance"]
 
 _Function = Callable[..., Array]
 _FEWEST, _MOST = 16, 256
+_POWER = {"radiance": 0, "importance": 2}
 
 
 class Cone(NamedTuple):
@@ -74,10 +75,9 @@ def projected_solid_angle_of_cone(theta: ArrayLike, half_angle: ArrayLike) -> Ar
     """Integral of cos over the part of a cone above the horizon, in sr; angles in rad.
 
     ``pi sin^2(a) cos(theta)`` where the cone does not cross the horizon, 0 below it. In
-    general, with ``w^2 = -cos(theta + a) cos(theta - a)``, or 0 where that is negative,
-    ``sin^2(a) cos(theta) atan2(w, -cos(a) cos(theta)) - w cos(a) + atan2(w, cos(a))``,
-    for all theta and a in [0, pi]: pi times the view factor of a sphere from a plane
-    element (Lagarde and de Rousiers 2014, Moving Frostbite to PBR, in half-angles).
+    general, with ``w^2 = max(0, -cos(theta + a) cos(theta - a))``, ``sin^2(a) cos(theta)
+    atan2(w, -cos(a) cos(theta)) - w cos(a) + atan2(w, cos(a))``, theta and a in [0, pi]:
+    pi times the view factor of a sphere (Lagarde and de Rousiers 2014, in half-angles).
     """
     lib, theta, a = _arrays(theta, half_angle)
     cos_t, cos_a, sin_a = lib.cos(theta), lib.cos(a), lib.sin(a)
@@ -207,8 +207,8 @@ def reflected_radiance_of_beam(
 ) -> Array:  # fmt: skip
     """``L_r = f E_n cos(theta_i)`` in W/(m^2 sr), ``(n, c)``, of a collimated beam.
 
-    ``normal_irradiance`` in W/m^2 on a plane across the beam; a number, or ``(n, 1)`` or
-    ``(n, c)``. Angles in rad, numbers or ``(n,)``; the beam may come from either side.
+    ``normal_irradiance`` in W/m^2 across the beam: a number, ``(n, 1)`` or ``(n, c)``.
+    Angles in rad, numbers or ``(n,)``; the beam may come from either side.
     """
     lib, *angles = _arrays(theta_i, phi_i, theta_r, phi_r)
     angles = [lib.atleast_1d(a) for a in lib.broadcast_arrays(*angles)]
@@ -240,7 +240,7 @@ def bsdf_for_other_convention(
     Importance. Reflection has both indices equal, and no difference.
     """
     _, f, n_i, n_o = _arrays(value, eta_i, eta_o)
-    return f * (n_i / n_o) ** (2 * ((wanted == "importance") - (given == "importance")))
+    return f * (n_i / n_o) ** (_POWER[wanted] - _POWER[given])
 
 
 def _callable(radiance: Field) -> _Function:

