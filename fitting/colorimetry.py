@@ -94,7 +94,7 @@ def colour_of(
 ) -> ObjectColour | None:  # fmt: skip
     """Colour of a spectrum of reflectance or transmittance factors (1 is the diffuser's).
 
-    ``X = 100 sum(R S xbar) / sum(S ybar)`` in steps of 1 nm (CIE 15:2018, section 7), see
+    ``X = 100 sum(R S xbar) / sum(S ybar)`` in steps of 1 nm (CIE 15:2018), see
     `tristimulus_weights`. ``wavelengths_nm, spectrum (c,)`` in any order; what is not
     finite is not measured. ``sigma (c,)`` (k = 1) are independent or, if ``correlated``, of
     one cause; or give ``covariance (c, c)``. XYZ has ``W^T C W``, L*a*b* its Jacobian's.
@@ -168,7 +168,7 @@ def tristimulus_weights(
 
     The sum is over the range of both tables. Between wavelengths a spectrum is linear or
     the cubic through the four nearest (Lagrange's, as in ASTM E2022); outside it keeps its
-    last value (CIE 15:2018, section 7.2.2.1), or, with ``none``, the sum ends and white is
+    last value (CIE 15:2018), or, with ``none``, the sum ends and white is
     relative to the same range. Raises `ColourError`.
     """
     w = np.asarray(wavelengths_nm, dtype=np.float64)
@@ -217,7 +217,7 @@ def _colour(
     linear = np.linalg.solve(primaries, adapt @ xyz)
     encoded = colour.cctf_encoding(linear, function="sRGB")
     if cov is not None:
-        # CIE 15:2018, section 8.2.1: a cube root down to (6/29)^3, a line below.
+        # CIE 15:2018: a cube root down to (6/29)^3, a line below.
         t = np.maximum(xyz / white, (6 / 29) ** 3)
         jacobian = np.array([[0, 116, 0], [500, -500, 0], [0, 200, -200]])
         jacobian = jacobian * (t ** (-2 / 3) / (3 * white))
