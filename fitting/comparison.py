@@ -10,9 +10,13 @@ from typing import Any
 import numpy as np
 
 from data_formats import Measurement
-from fitting.expression import ModelError
+from fitting.expression import ModelError, Term, parse
 from fitting.fitter import Progress, fit
+from fitting.model import Model
+from fitting.models import lobe_names
+from fitting.models.lobe import THROUGH
 from fitting.options import FitOptions
+from fitting.problem import ways_of
 from fitting.result import FitResult
 
 # What is tried when the user names no model: diffuse plus one lobe with long skirts, with
@@ -25,6 +29,50 @@ DEFAULT_MODELS = (
     "lambert + 2*ggx",
     "lambert + ggx + blinn_phong",
 )
+
+
+# The same with transmitted light: what is diffuse, and foils or plates that are clear to a
+# degree. A single interface to another medium is no sample between two airs, and left out.
+_REFLECTED_AND_TRANSMITTED = (
+    "lambert + lambert_transmission",
+    "lambert + ggx + lambert_transmission",
+    "lambert + lambert_transmission + thin_slab",
+    "lambert + lambert_transmission + thin_slab(two_widths)",
+    "lambert + ggx + lambert_transmission + thin_slab",
+)
+_TRANSMITTED = (
+    "lambert_transmission",
+    "thin_slab",
+    "lambert_transmission + thin_slab",
+    "lambert_transmission + 2*thin_slab",
+)
+
+
+def default_models(measurement: Measurement) -> tuple[str, ...]:
+    """What to compare on these data: models that know the ways of light that were measured.
+
+    For light from the back every lobe that only knows the front gets a twin there.
+    """
+    found = set(np.unique(ways_of(measurement)[measurement.valid.any(axis=1)]))
+    through, reflected = found & set(THROUGH), found - set(THROUGH)
+    models = DEFAULT_MODELS
+    if through:
+        models = _REFLECTED_AND_TRANSMITTED if reflected else _TRANSMITTED
+    if "back" not in found:
+        return models
+    return tuple(_on_both_sides(m, front="front" in found) for m in models)
+
+
+def _on_both_sides(expression: str, *, front: bool) -> str:
+    model = Model(expression)
+    out: list[str] = []
+    for term, lobe in zip(parse(expression, lobe_names()), model.lobes, strict=True):
+        if lobe.ways != ("front",):
+            out.append(str(term))
+            continue
+        out += [str(term)] if front else []
+        out.append(str(Term(term.lobe, (*term.options, "back"))))
+    return Model(" + ".join(out)).expression
 
 
 @dataclass(frozen=True)
@@ -43,7 +91,7 @@ def n_free(result: FitResult) -> int:
 
 def compare(
     measurement: Measurement,
-    models: Sequence[str] | str = DEFAULT_MODELS,
+    models: Sequence[str] | str | None = None,
     options: FitOptions | None = None,
     *,
     progress: Progress | None = None,
@@ -51,11 +99,14 @@ def compare(
 ) -> Comparison:
     """Fit every model and keep the smallest one that predicts as well as the best.
 
+    Without ``models``, those of `default_models`.
+
     As well means: the ratio of its held-out error to that of the best, angle of incidence
     by angle of incidence, is above 1 by less than one standard error (the rule of Breiman
     et al. 1984, Classification and Regression Trees, sec. 3.4.3, paired). Ratios, because
     the most grazing angle has errors many times those of the others and would decide alone.
     """
+    models = default_models(measurement) if models is None else models
     if not models:
         raise ModelError("no model to compare; leave models out for the default ones")
     models = [models] if isinstance(models, str) else models
@@ -75,6 +126,12 @@ def choose(results: tuple[FitResult, ...]) -> tuple[int, str]:
     """Index of the result to keep, and why, in one sentence."""
     if len(results) == 1:
         return 0, f"{results[0].model} is the only model asked for"
+    if len({r.data.rows_used for r in results}) > 1:
+        best = int(np.argmax([r.data.rows_used for r in results]))
+        return best, (
+            f"{results[best].model} describes the most rows; errors on different rows do "
+            "not compare (see 'left out' in each result)"
+        )
     held = [_held_out(r) for r in results]
     if any(h is None for h in held):
         best = int(np.argmin([r.solver.cost for r in results]))

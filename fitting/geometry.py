@@ -9,7 +9,7 @@ Half vectors are formed here in float64 and stored, because ``sin^2(theta_h)`` t
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from typing import Any
 
 import equinox as eqx
@@ -115,6 +115,30 @@ class Geometry(eqx.Module):
         return dataclasses.replace(
             self, cos_o=-self.cos_o, hx=hx, hy=hy, hz=hz, cos_d=cos_d
         )
+
+    def refracting(self, eta: Array) -> tuple[Array, Array, Array]:
+        """``-(w_f + eta w_b)`` of the directions in front and behind, of transmitted pairs.
+
+        Along the half vector of refraction, of Walter et al. 2007, eq. 16, as seen from
+        both sides. As ``(eta - 1) w_f - eta (wi + wo)``, with the stored half vector.
+        """
+        lib = _library(self.cos_i, self.cos_o)
+        down = self.cos_i > 0
+        step, twice = eta - 1.0, 2.0 * self.cos_d * eta
+        above = lib.where(down, self.cos_i, self.cos_o)
+        below = lib.where(down, self.cos_o, self.cos_i)
+        return (
+            step * lib.where(down, self.wix, self.wox) - twice * self.hx,
+            step * lib.where(down, self.wiy, self.woy) - twice * self.hy,
+            -eta * below - above,
+        )
+
+    def on(self, ways: Container[str]) -> Array:
+        """True where the light takes one of these ways: see `fitting.models.lobe.Way`."""
+        seen = self.transmits & (self.cos_i > 0) & ("down" in ways)
+        seen = seen | (self.transmits & (self.cos_i < 0) & ("up" in ways))
+        seen = seen | (self.reflects & ("front" in ways))
+        return seen | (self.turned_over.reflects & ("back" in ways))
 
     @property
     def reflects(self) -> Array:

@@ -10,10 +10,7 @@ from data_formats import Measurement
 from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions, Value
-from fitting.refractive_index import Index, refractive_index
-
-# An absorption below this is that of a glass, whose index alone tells its reflectance.
-_TRANSPARENT = 1e-2
+from fitting.refractive_index import TRANSPARENT, Index, refractive_index
 
 
 def with_given(measurement: Measurement, model: Model, options: FitOptions) -> FitOptions:
@@ -58,7 +55,7 @@ def _fixed(label: str, index: Index, declared: set[str]) -> dict[str, Value]:
         )
     if names[1] in declared:
         return {names[0]: index.eta, names[1]: index.k}
-    if np.any(index.k > _TRANSPARENT):
+    if np.any(index.k > TRANSPARENT):
         raise ModelError(
             f"material of {label}: {index.source} absorbs (k up to {index.k.max():.3g}), "
             "but the lobe has no k: give it the option 'conductor'"

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import csv
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from fitting.expression import ModelError
+
+# An absorption below this is that of a glass, whose index alone tells its reflectance.
+TRANSPARENT = 1e-2
 
 
 @dataclass(frozen=True)
@@ -31,9 +35,33 @@ def refractive_index(material: str, wavelengths_nm: np.ndarray) -> Index:
     absent) k, separated by commas or blanks; or what the refractiveindex.info database
     knows it by: ``Au``, ``Au/Johnson``, ``SiO2 Malitson``. The first page that holds all
     wavelengths counts. Between the entries of a table it is linear; beyond them it is not
-    known. Raises `ModelError` that says what is missing.
+    known. ``A in B`` is the index of A relative to that of B, which has to be clear; both
+    may also be plain numbers, ``1.5168 in H2O``. Raises `ModelError` that says what is
+    missing.
     """
+    inside, _, outside = material.partition(" in ")
+    if not outside:
+        return _of_material(inside, wavelengths_nm)
+    one, other = (_of_material(m.strip(), wavelengths_nm) for m in (inside, outside))
+    if np.any(other.k > TRANSPARENT):
+        raise ModelError(
+            f"material {material!r}: {other.source} absorbs (k up to {other.k.max():.3g}); "
+            "light has to come through the medium behind 'in'"
+        )
+    source = f"{one.source} in {other.source}"
+    return Index(one.eta / other.eta, one.k / other.eta, source, one.k_known)
+
+
+def _of_material(material: str, wavelengths_nm: np.ndarray) -> Index:
     wanted = np.asarray(wavelengths_nm, dtype=np.float64)
+    try:
+        number = float(material)
+    except ValueError:
+        pass
+    else:
+        if not (math.isfinite(number) and number > 0):
+            raise ModelError(f"material {material!r}: an index must be above 0 and finite")
+        return Index(np.full_like(wanted, number), np.zeros_like(wanted), material)
     path = Path(material).expanduser()
     if path.suffix.lower() in (".csv", ".txt", ".dat", ".nk"):
         return _of_table(path, wanted)

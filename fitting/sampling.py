@@ -9,8 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from fitting.geometry import Geometry
-from fitting.models.lobe import AxisPeak, Lobe, Peak
+from fitting.models.lobe import AxisPeak, Lobe, Peak, Shape
 from fitting.models.retro import Retro
+from fitting.models.turned_over import TurnedOver
 from fitting.reduced import Problem
 from fitting.solid_angle import angle_labels
 
@@ -30,17 +31,36 @@ class Distances(NamedTuple):
     along_y: np.ndarray
 
 
-def _towards(g: Geometry, lobe: Lobe) -> Geometry:
-    """The geometry as the lobe sees it: with the source turned, if it shines back."""
-    return jax.tree.map(np.asarray, g.turned if isinstance(lobe, Retro) else g)
+def _towards(g: Geometry, lobe: Lobe) -> tuple[Geometry, Lobe]:
+    """The geometry as a lobe inside of others sees it: turned around, turned over."""
+    if isinstance(lobe, TurnedOver):
+        return _towards(g.turned_over, lobe.inner)
+    if isinstance(lobe, Retro):
+        return g.turned, lobe.inner
+    return g, lobe
 
 
-def half_vector_slopes(g: Geometry) -> tuple[np.ndarray, np.ndarray]:
-    """Slopes ``hx / hz`` and ``hy / hz`` of the half vectors, infinite on the horizon."""
-    hx, hy, hz = (np.asarray(a, dtype=np.float64) for a in (g.hx, g.hy, g.hz))
+def facet_slopes(g: Geometry, lobe: Lobe, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes along x and y of the facets that send the light where it was measured.
+
+    Of transmitted light those that refract it, or let it pass straight on. Infinite where
+    there are none.
+    """
+    g, lobe = _towards(g, lobe)
+    front, _ = g.from_front
+    x, y, z = (np.asarray(a, dtype=np.float64) for a in (front.hx, front.hy, front.hz))
+    passage = lobe.passage(shape)
+    through = np.asarray(g.transmits)
+    if passage is not None and through.any():
+        u = front.unfolded
+        bent = (u.hx, u.hy, u.hz)
+        if passage.eta is not None:
+            bent = g.refracting(passage.eta)
+        x, y, z = (np.where(through, b, a) for a, b in zip((x, y, z), bent, strict=True))
     with np.errstate(divide="ignore", invalid="ignore"):
-        slopes = hx / hz, hy / hz
-    return tuple(np.where(hz > 0, s, np.inf) for s in slopes)  # type: ignore[return-value]
+        slopes = x / z, y / z
+    seen = np.asarray(g.on(lobe.ways)) & (z > 0)
+    return tuple(np.where(seen, s, np.inf) for s in slopes)  # type: ignore[return-value]
 
 
 def axis_slopes(g: Geometry, peak: AxisPeak) -> np.ndarray:
@@ -53,16 +73,17 @@ def axis_slopes(g: Geometry, peak: AxisPeak) -> np.ndarray:
     return np.where(dot > 0, across / np.where(dot > 0, dot, 1.0), np.inf)
 
 
-def distances(g: Geometry, lobe: Lobe, peak: Peak) -> Distances | None:
+def distances(g: Geometry, lobe: Lobe, shape: Shape) -> Distances | None:
     """How many widths every row is away from the top; None for a lobe without a peak."""
+    peak = lobe.peak(shape)
     if peak is None:
         return None
-    g = _towards(g, lobe)
     if isinstance(peak, AxisPeak):
         # cos^n is exp(-x^2 n / 2) near its axis.
-        r = axis_slopes(g, peak) * np.sqrt(0.5 * max(float(peak.exponent), 1e-3))
+        r = axis_slopes(_towards(g, lobe)[0], peak)
+        r = r * np.sqrt(0.5 * max(float(peak.exponent), 1e-3))
         return Distances(r, r, r)
-    x, y = half_vector_slopes(g)
+    x, y = facet_slopes(g, lobe, shape)
     c, s = np.cos(float(peak.angle)), np.sin(float(peak.angle))
     far = ~(np.isfinite(x) & np.isfinite(y))
     x, y = np.where(far, 0.0, x), np.where(far, 0.0, y)
@@ -130,7 +151,7 @@ def sentences(problem: Problem, values: dict[str, np.ndarray]) -> list[str]:
         if not mine:
             continue
         arrays = {n: jnp.asarray(v) for n, v in own.items()}
-        away = distances(geometry, lobe, lobe.peak(arrays))
+        away = distances(geometry, lobe, arrays)
         if away is None:
             continue
         amplitudes = [n for n in declared if n.startswith(f"{model.labels[i]}.")]
@@ -189,15 +210,16 @@ def visible_width(problem: Problem, lobe: Lobe, shape: dict[str, float]) -> floa
     Between the last row that is above half and the first one beyond that is below. None
     for a lobe without a peak, or where no row lies beyond.
     """
-    peak = lobe.peak({n: jnp.asarray(v) for n, v in shape.items()})
+    own = {n: jnp.asarray(v) for n, v in shape.items()}
+    peak = lobe.peak(own)
     if peak is None:
         return None
-    geometry = _towards(problem.geometry, lobe)
+    geometry = jax.tree.map(np.asarray, problem.geometry)
     if isinstance(peak, AxisPeak):
-        slope = axis_slopes(geometry, peak)
+        slope = axis_slopes(_towards(geometry, lobe)[0], peak)
     else:
-        slope = np.hypot(*half_vector_slopes(geometry))
-    used = used_rows(problem)
+        slope = np.hypot(*facet_slopes(geometry, lobe, own))
+    used = used_rows(problem) & np.asarray(geometry.on(lobe.ways))
     weighted = np.where(np.asarray(problem.weight) > 0, problem.linear_target, -np.inf)
     value = np.max(weighted, axis=0)[used]
     slope = slope[used]

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from cyclopts import App
 
 _COMMANDS = {
-    "fit": "Fit models to a file of measured reflectance and judge the result.",
+    "fit": "Fit models to measured reflectance or transmittance and judge the result.",
     "info": "Say what is in a file: geometry, coverage, values, quality.",
     "score": "Measure a fit result against a file, without fitting.",
     "convert": "Write a file of measured reflectance in another format.",
@@ -33,6 +33,7 @@ Examples:
   brdf fit paint.astm                       some common models compared
   brdf fit paint.astm -m 'lambert + ggx'    one model
   brdf fit paint.astm -m 'eon + ggx' --fix ggx.f90=1 --max-theta 75
+  brdf fit foil_r.astm foil_t.astm          reflection and transmission together
   brdf fit paint.astm --json > paint.json   for programs
 """,
     "info": "Example: brdf info paint.astm\n",

@@ -14,10 +14,12 @@ from fitting.solid_angle import incidence_labels
 _IN_PLANE = math.radians(1.0)
 
 
-def summarise(m: Measurement) -> dict[str, Any]:
-    """Everything that `brdf info` says, ready for JSON: no NaN, angles in deg."""
+def summarise(m: Measurement, relative_index: float = 1.0) -> dict[str, Any]:
+    """Everything that `brdf info` says, ready for JSON: no NaN, angles in deg.
+
+    ``relative_index`` is that behind the sample relative to that in front.
+    """
     value = m.value[m.valid]
-    reciprocity = diagnostics.data_reciprocity(m)
     p = m.provenance
     return {
         "path": p.path,
@@ -29,7 +31,8 @@ def summarise(m: Measurement) -> dict[str, Any]:
         "header": dict(p.header),
         "symmetry": m.symmetry,
         "rows": m.n_rows,
-        "rows_transmitted": int(np.count_nonzero(m.theta_r > 0.5 * math.pi)),
+        "rows_transmitted": int(np.count_nonzero(m.transmitted)),
+        "rows_from_back": int(np.count_nonzero(m.from_back)),
         "rows_in_plane": int(np.count_nonzero(_in_plane(m))),
         "has_uncertainty": m.sigma is not None,
         "auxiliary": sorted(m.auxiliary),
@@ -53,32 +56,43 @@ def summarise(m: Measurement) -> dict[str, Any]:
             "zero": int(np.count_nonzero(value == 0)),
         },
         "incidence": _incidence(m),
-        "reciprocity": None
-        if reciprocity is None
-        else {"median_relative_difference": reciprocity[0], "pairs": reciprocity[1]},
+        "reciprocity": _reciprocity(diagnostics.data_reciprocity(m)),
+        "reciprocity_transmitted": _reciprocity(
+            diagnostics.data_transmitted_reciprocity(m, relative_index)
+        ),
+        "relative_index": relative_index,
         "notes": [
             {"code": n.code, "sentence": n.sentence, "count": n.count} for n in m.notes
         ],
     }
 
 
+def _reciprocity(found: tuple[float, int] | None) -> dict[str, float] | None:
+    if found is None:
+        return None
+    return {"median_relative_difference": found[0], "pairs": found[1]}
+
+
 def _incidence(m: Measurement) -> list[dict[str, Any]]:
-    """Geometry and coverage for every polar angle of incidence."""
+    """Geometry and coverage for every polar angle of incidence, and on either side."""
     label = incidence_labels(m.theta_i) if m.n_rows else np.zeros(0, dtype=int)
-    albedo = {round(t, 6): (a, c) for t, a, c in diagnostics.data_albedo(m)}
+    albedo = diagnostics.data_albedo(m)
+    through = m.transmitted
     azimuth = np.degrees(np.mod(m.phi_r - m.phi_i, 2 * np.pi))
     mirror = np.degrees(_separation(m, m.phi_i + np.pi))
     retro = np.degrees(_separation(m, m.phi_i))
     out: list[dict[str, Any]] = []
-    for k in np.unique(label):
-        rows = np.flatnonzero(label == k)
+    for key in np.unique(2 * label + through):
+        rows = np.flatnonzero(2 * label + through == key)
         theta_r = np.degrees(m.theta_r[rows])
-        mean = float(m.theta_i[rows].mean())
+        mean = float(m.theta_i[label == key // 2].mean())
         measured = rows[m.valid[rows].any(axis=1)]
-        total, covered = _nearest(albedo, mean)
+        found = next((a for a in albedo if abs(a.theta_i - mean) < 1e-4), None)
+        total, covered = _part(found, transmitted=bool(key % 2))
         out.append(
             {
                 "theta_i_deg": math.degrees(mean),
+                "transmitted": bool(key % 2),
                 "rows": int(rows.size),
                 "valid": _share(m.valid[rows]),
                 "theta_r_deg": [float(theta_r.min()), float(theta_r.max())],
@@ -93,13 +107,15 @@ def _incidence(m: Measurement) -> list[dict[str, Any]]:
     return out
 
 
-def _nearest(
-    albedo: dict[float, tuple[float, float]], theta: float
+def _part(
+    found: diagnostics.Albedo | None, *, transmitted: bool
 ) -> tuple[float | None, float | None]:
-    for key, found in albedo.items():
-        if abs(key - theta) < 1e-4:
-            return found
-    return None, None
+    """What is reflected or transmitted, and the share of the hemisphere that covers it."""
+    if found is None or (transmitted and found.transmitted is None):
+        return None, None
+    if transmitted:
+        return found.transmitted, found.transmitted_covered
+    return found.albedo - (found.transmitted or 0.0), found.covered
 
 
 def _in_plane(m: Measurement) -> np.ndarray:
@@ -108,8 +124,13 @@ def _in_plane(m: Measurement) -> np.ndarray:
 
 
 def _separation(m: Measurement, phi: np.ndarray) -> np.ndarray:
-    """Angle between the detector and the direction of polar angle theta_i at ``phi``."""
+    """Angle between the detector and the direction of polar angle theta_i at ``phi``.
+
+    Of transmitted light the detector is mirrored at the surface: straight on is 0 from the
+    mirror direction.
+    """
     cosine = np.cos(m.theta_i) * np.cos(m.theta_r)
+    cosine = np.where(m.transmitted, -cosine, cosine)
     cosine = cosine + np.sin(m.theta_i) * np.sin(m.theta_r) * np.cos(m.phi_r - phi)
     return np.arccos(np.clip(cosine, -1.0, 1.0))
 

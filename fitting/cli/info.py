@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json as json_module
+import math
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from cyclopts import Parameter
+
+from fitting.cli.failures import UsageError
 from fitting.cli.flags import File, Flags, Format, Json, Reader
 
 if TYPE_CHECKING:
@@ -19,9 +23,18 @@ def info(
     json: Json = False,
     format: Format = None,
     reader: Reader = None,
+    relative_index: Annotated[
+        float,
+        Parameter(
+            help="Index of the medium behind the sample relative to the one in front, for "
+            "the reciprocity of transmitted light."
+        ),
+    ] = 1.0,
     flags: Flags | None = None,
 ) -> int:
     """Say what is in a file: geometry, coverage, values, quality."""
+    if not 0 < relative_index < math.inf:
+        raise UsageError(f"--relative-index {relative_index:g}: expected a number above 0")
     from fitting.cli import assignments, reading
 
     options = assignments.of_lines("reader", reader or [])
@@ -29,7 +42,7 @@ def info(
 
     from fitting.cli.data_summary import summarise
 
-    summary = summarise(measurement)
+    summary = summarise(measurement, relative_index)
     if json:
         sys.stdout.write(json_module.dumps(summary, indent=1, allow_nan=False) + "\n")
         return 0
@@ -69,6 +82,7 @@ def _geometry(out: Console, s: dict[str, Any]) -> None:
     from fitting.quantities import count, degrees, percent, valid_share
 
     out.print(heading("Geometry, by angle of incidence"))
+    through = any(i["transmitted"] for i in s["incidence"])
     rows = table(
         "theta_i", "rows", "valid", "theta_r", "steps up to", "azimuth", "mirror", "retro",
         "albedo", "covered",
@@ -77,9 +91,8 @@ def _geometry(out: Console, s: dict[str, Any]) -> None:
         if line is None:
             rows.add_row("...")
             continue
-        covered = line["covered"]
         rows.add_row(
-            degrees(line["theta_i_deg"]),
+            degrees(line["theta_i_deg"]) + (" R", " T")[line["transmitted"]] * through,
             str(line["rows"]),
             valid_share(line["valid"]),
             _range(line["theta_r_deg"]),
@@ -88,20 +101,29 @@ def _geometry(out: Console, s: dict[str, Any]) -> None:
             _rounded(line["nearest_to_mirror_deg"], 1),
             _rounded(line["nearest_to_retro_deg"], 1),
             _rounded(line["albedo"], 3),
-            "-" if covered is None else percent(covered),
+            "-" if line["covered"] is None else percent(line["covered"]),
         )
     out.print(rows)
     out.print(
         "angles in deg; azimuth of the detector from the source's (180: mirror side); "
         "mirror, retro: distance of these directions to the nearest valid row; albedo of "
-        "the largest channel by summation over the covered share of the hemisphere",
+        "the largest channel by summation over the covered share of the hemisphere"
+        + (
+            "; R: reflected, T: transmitted, straight on counts as mirror"
+            if through
+            else ""
+        ),
         style="dim",
     )
     inside, total = s["rows_in_plane"], s["rows"]
     where = "all" if inside == total else f"{inside} of {count(total, 'row')}"
     out.print(f"in the plane of incidence: {where}; symmetry: {s['symmetry']}")
     if s["rows_transmitted"]:
-        out.print(f"transmitted (theta_r > 90 deg): {count(s['rows_transmitted'], 'row')}")
+        out.print(f"transmitted light: {count(s['rows_transmitted'], 'row')}")
+    if s["rows_from_back"]:
+        out.print(
+            f"lit from the back (theta_i > 90 deg): {count(s['rows_from_back'], 'row')}"
+        )
 
 
 def _values(out: Console, s: dict[str, Any], everything: bool) -> None:
@@ -132,22 +154,28 @@ def _quality(out: Console, s: dict[str, Any]) -> None:
     from fitting.quantities import count, percent
 
     out.print(heading("Quality"))
-    r = s["reciprocity"]
-    if r is None:
+    r, t = s["reciprocity"], s["reciprocity_transmitted"]
+    if r is None and t is None:
         bullet(out, "reciprocity cannot be tested: no exchanged directions were measured")
-    else:
+    index = s["relative_index"]
+    over = f", over the squared index, {index:g} behind" if index != 1.0 else ""
+    for found, light in ((r, ""), (t, f" in transmission{over}")):
+        if found is not None:
+            bullet(
+                out,
+                f"exchanging source and detector changes the data{light} by "
+                f"{percent(found['median_relative_difference'])} (median of "
+                f"{count(found['pairs'], 'pair')}, interpolated)",
+            )
+    total: dict[float, float] = {}
+    for line in s["incidence"]:
+        theta = line["theta_i_deg"]
+        total[theta] = total.get(theta, 0.0) + (line["albedo"] or 0.0)
+    for theta, albedo in [(t, a) for t, a in total.items() if a > 1.0][:3]:
         bullet(
             out,
-            "exchanging source and detector changes the data by "
-            f"{percent(r['median_relative_difference'])} (median of "
-            f"{count(r['pairs'], 'pair')}, interpolated)",
-        )
-    bright = [i for i in s["incidence"] if (i["albedo"] or 0.0) > 1.0]
-    for line in bright[:3]:
-        bullet(
-            out,
-            f"at theta_i = {line['theta_i_deg']:.1f} deg the data sum to "
-            f"{percent(line['albedo'])} of the light: more than falls in",
+            f"at theta_i = {theta:.1f} deg the data sum to "
+            f"{percent(albedo)} of the light: more than falls in",
         )
     for note in s["notes"]:
         bullet(out, note["sentence"])

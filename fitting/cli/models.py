@@ -44,21 +44,37 @@ def _list(out: Console) -> None:
     from fitting.cli.terminal import table
     from fitting.models import lobe_class, lobe_names
 
-    rows = table("lobe", "reciprocal", "albedo", "what it is", left=4)
+    rows = table("lobe", "light", "reciprocal", "albedo", "what it is", left=5)
     for name in lobe_names():
         lobe = lobe_class(name)
         rows.add_row(
             name,
+            _light(lobe.WAYS),
             "yes" if lobe.RECIPROCAL else "no",
             "no bound" if lobe.ALBEDO_BOUND is None else f"<= {lobe.ALBEDO_BOUND:.4g}",
             _first_line(lobe),
         )
     out.print(rows)
     out.print(
-        "\nA model is a sum of lobes: 'lambert + ggx', 'eon + 2*ggx(aniso)'. albedo: of "
+        "\nA model is a sum of lobes: 'lambert + ggx', 'eon + 2*ggx(aniso)'. light: "
+        "reflected (R) or transmitted (T). albedo: of "
         "the lobe with its coefficients at 1. One lobe in full: brdf models NAME",
         style="dim",
     )
+
+
+_WAYS = {
+    "front": "reflected at the front",
+    "back": "reflected at the back",
+    "down": "from front to back",
+    "up": "from back to front",
+}
+
+
+def _light(ways: Collection[str]) -> str:
+    """Whether a lobe reflects (R), transmits (T) or both."""
+    reflects = "R" if {"front", "back"} & set(ways) else ""
+    return reflects + ("T" if {"down", "up"} & set(ways) else "")
 
 
 def _describe(out: Console, name: str) -> None:
@@ -89,6 +105,7 @@ def _describe(out: Console, name: str) -> None:
             if own is not None and not default:
                 _parameters(out, lobe, usual, **{field: value})
     out.print(heading("Facts"))
+    bullet(out, f"light: {', '.join(_WAYS[w] for w in lobe.WAYS)}")
     bullet(out, "reciprocal" if lobe.RECIPROCAL else "not reciprocal")
     if lobe.ALBEDO_BOUND is None:
         bullet(out, "its albedo has no bound, so --energy hard is not possible")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +48,16 @@ def read_file(
         raise
 
 
+def read_files(
+    paths: Sequence[Path], format: str | None, reader: Mapping[str, Any] | None = None
+) -> Measurement:
+    """The measurement of one file, or of several files of one sample together."""
+    import data_formats
+
+    found = [read_file(path, format, reader) for path in paths]
+    return found[0] if len(found) == 1 else data_formats.join(*found)
+
+
 def reader_options(module: Any) -> list[str]:
     """Options of a format's reader: name, default, and what its documentation says."""
     lines = inspect.cleandoc(module.read.__doc__ or "").split("\n- ")
@@ -75,14 +85,12 @@ def stem(path: Path) -> str:
     return Path(name).stem or name
 
 
-def headline(measurement: Measurement, path: Path) -> str:
+def headline(measurement: Measurement, *paths: Path) -> str:
     """One line on what the data are."""
     from fitting.quantities import channel_span, count
 
     names = [c.name for c in measurement.channels]
     sample = measurement.provenance.sample
     about = f" ({sample})" if sample else ""
-    return (
-        f"{path.name}{about}: {count(measurement.n_rows, 'row')}, {channel_span(names)}, "
-        f"{measurement.symmetry}"
-    )
+    rows, files = count(measurement.n_rows, "row"), " + ".join(p.name for p in paths)
+    return f"{files}{about}: {rows}, {channel_span(names)}, {measurement.symmetry}"

@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 
 from data_formats import Measurement
+from fitting.model import Model
+from fitting.problem import select_rows
 from fitting.quantities import degrees, percent
 from fitting.result import FitResult
 
@@ -52,9 +54,8 @@ def typical_deviation(result: FitResult, measurement: Measurement) -> float:
     The same figure as the reciprocity error of the data, so that the two compare.
     """
     m = measurement
-    limit = math.radians(result.settings.max_theta_deg) + 1e-6
-    used = (m.theta_i <= limit) & (m.theta_r <= min(limit, 0.5 * math.pi + 1e-6))
-    at = np.flatnonzero(used & m.valid.any(axis=1))
+    limit = result.settings.max_theta_deg
+    at = select_rows(m, limit, Model(result.model).ways).index
     fitted = result.evaluate(m.theta_i[at], m.phi_i[at], m.theta_r[at], m.phi_r[at])
     valid = m.valid[at]
     count = valid.sum(axis=1)
@@ -72,7 +73,7 @@ def _headline(result: FitResult, deviation: float) -> tuple[Level, str]:
     if not result.solver.converged:
         return "poor", f"Not a fit yet: the search {result.solver.sentence}."
     name, off = result.model, percent(deviation)
-    measured = result.data.reciprocity
+    measured = result.data.reciprocity or result.data.reciprocity_transmitted
     if measured is None:
         level: Level = (
             "good" if deviation <= _GOOD else "fair" if deviation <= _FAIR else "poor"
@@ -141,8 +142,6 @@ def _misfit(result: FitResult, level: Level) -> list[str]:
 
 
 def _richer(expression: str) -> str:
-    from fitting.model import Model
-
     model = Model(expression)
     if len(model.labels) > 2:
         return "other lobes than these"
@@ -201,7 +200,8 @@ def _physics(result: FitResult) -> list[str]:
     e = result.energy
     if e.max_albedo > _ABOVE_ONE:
         out.append(
-            f"the fit reflects {percent(e.max_albedo)} of the light at theta_i = "
+            f"the fit reflects {'and transmits ' if e.transmitted else ''}"
+            f"{percent(e.max_albedo)} of the light at theta_i = "
             f"{e.theta_deg:g} deg ({e.channel}), more than it receives: --energy hard "
             "forbids it, a larger --energy discourages it"
         )

@@ -119,7 +119,10 @@ def single_scattering(
 
         def cos_lambda() -> tuple[Array, Array]:
             if "alpha" not in shape:
-                return facets.cos_lambda(s.i2, g.cos_i), facets.cos_lambda(s.o2, g.cos_o)
+                return (
+                    facets.cos_lambda(s.i2, abs(g.cos_i)),
+                    facets.cos_lambda(s.o2, abs(g.cos_o)),
+                )
             a2 = shape["alpha"] ** 2
             return g.over_angles(lambda sine2, c: facets.cos_lambda(sine2 * a2, c))
 

@@ -100,15 +100,10 @@ def _refracting(g: Geometry, eta: Array) -> tuple[Geometry, Array]:
     ``1 - F`` is the mean of ``4 i eta o / (i + eta o)^2`` and ``4 i eta o / (eta i +
     o)^2``: with the cosines on both sides known there is no root and no total reflection.
     """
-    down = g.cos_i > 0
-    above, below = jnp.where(down, g.cos_i, g.cos_o), jnp.where(down, -g.cos_o, -g.cos_i)
-    step, twice = eta - 1.0, 2.0 * g.cos_d
-    # eta (w_f + w_b) - (eta - 1) w_f, the sum from the stored half vector.
-    x = step * jnp.where(down, g.wix, g.wox) - eta * (twice * g.hx)
-    y = step * jnp.where(down, g.wiy, g.woy) - eta * (twice * g.hy)
-    z = eta * below - above
+    down, step = g.cos_i > 0, eta - 1.0
+    x, y, z = g.refracting(eta)
     # w_f . w_b = 2 cos_d^2 - 1.
-    sum2 = 0.5 * twice * twice
+    sum2 = 2.0 * g.cos_d * g.cos_d
     i, o = step - eta * sum2, step + sum2
     passes = g.transmits & (i > 0) & (z > 0)
     i, o = jnp.where(passes, i, 1.0), jnp.where(passes, o, 1.0)

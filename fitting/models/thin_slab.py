@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array
 
 from fitting.geometry import Geometry
@@ -61,11 +62,13 @@ class ThinSlab(Lobe):
         reflected, _ = self._plate(shape, front.cos_d)
         _, transmitted = self._plate(shape, straight.cos_d)
         facets = FACETS[self.distribution]
-        through = {**shape, "alpha": shape["alpha_t"]} if self.two_widths else shape
+        wide = {**shape, "alpha": shape["alpha_t"]} if self.two_widths else shape
+        at_front = microfacet.single_scattering("uncorrelated", facets, shape)(front)
+        through = microfacet.single_scattering("uncorrelated", facets, wide)(straight)
+        # Unfolded, what is reflected along the horizon would count a second time.
         return (
-            microfacet.single_scattering("uncorrelated", facets, shape)(front) * reflected,
-            microfacet.single_scattering("uncorrelated", facets, through)(straight)
-            * transmitted,
+            at_front * reflected,
+            jnp.where(geometry.transmits, through * transmitted, 0.0),
         )
 
     def _plate(self, shape: Shape, cos_d: Array) -> tuple[Array, Array]:

@@ -11,12 +11,16 @@ def schlick(value, s, t):
     return value * (1 - q), value * q
 
 
-def dielectric_reflectance(theta, eta):
-    """Fresnel by Snell's refracted angle."""
+def dielectric_amplitudes(theta, eta):
+    """Fresnel by Snell's refracted angle, complex where all is reflected: s and p."""
     inside = mp.asin(mp.sin(theta) / eta)
     c, ct = mp.cos(theta), mp.cos(inside)
-    rs = (c - eta * ct) / (c + eta * ct)
-    rp = (eta * c - ct) / (eta * c + ct)
+    return (c - eta * ct) / (c + eta * ct), (eta * c - ct) / (eta * c + ct)
+
+
+def dielectric_reflectance(theta, eta):
+    """Of unpolarised light."""
+    rs, rp = dielectric_amplitudes(theta, eta)
     return (rs**2 + rp**2) / 2
 
 

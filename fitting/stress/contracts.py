@@ -9,7 +9,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from fitting.albedo import albedo_basis
+from fitting.albedo import LEAVING, albedo_basis
+from fitting.models import Way
 from fitting.stress import points as at
 from fitting.stress.exercise import Everything, Exercise
 from fitting.stress.finding import Finding
@@ -51,9 +52,16 @@ def declared(variant: Variant) -> Finding:
 
 
 def reciprocity(exercise: Exercise, points: Points) -> Finding:
-    """``f(wi, wo) = f(wo, wi)`` to 1e-12 of the value, or what is declared instead."""
+    """``f(wi, wo) / n_o^2 = f(wo, wi) / n_i^2`` to 1e-12 of the value, or what is declared
+    instead."""
     there = exercise.value(points)
     back = exercise.value(points, points.geometry.swapped)
+    index = _relative_index(exercise, points)
+    # What leaves into the other medium, over its squared index.
+    down = (points.theta_i < at.HORIZON) & (points.theta_o > at.HORIZON)
+    up = (points.theta_i > at.HORIZON) & (points.theta_o < at.HORIZON)
+    there = np.where(down, there / index**2, there)
+    back = np.where(up, back / index**2, back)
     size = np.maximum(np.abs(there), np.abs(back))
     if not exercise.variant.lobe.NONNEGATIVE:
         # Where a kernel goes through zero nothing is left to be relative to.
@@ -131,10 +139,17 @@ def _all_finite(name: str, bad: dict[str, np.ndarray], points: Points) -> Findin
 
 
 def below_the_horizon(exercise: Exercise) -> Finding:
-    """Exactly zero where source or detector is below, or both are on the horizon."""
+    """Exactly zero on ways of light that the lobe does not know, and along the horizon."""
     ti, to = np.radians([[91.0, 30.0, 120.0, 90.0, 180.0], [10.0, 100.0, 170.0, 90.0, 0.0]])
+    way = np.array(["up", "down", "back", "", "up"])
+    unknown = ~np.isin(way, exercise.variant.lobe.ways)
+    count = int(np.count_nonzero(unknown))
     points = Points(
-        ti, np.full(5, 0.1), to, np.full(5, 2.0), at.default_shape(exercise.variant, 5)
+        ti[unknown],
+        np.full(count, 0.1),
+        to[unknown],
+        np.full(count, 2.0),
+        at.default_shape(exercise.variant, count),
     )
     worst, where = _worst(np.abs(exercise.value(points)), points)
     said = "zero" if worst == 0 else f"there is a value of {worst:.3g}"
@@ -143,6 +158,8 @@ def below_the_horizon(exercise: Exercise) -> Finding:
 
 def at_the_horizon(exercise: Exercise, count: int = 50) -> Finding:
     """The value at exactly 90 degrees is the limit from above."""
+    if "front" not in exercise.variant.lobe.ways:
+        return Finding("at the horizon", True, 0.0, "", "the horizon is for reflection")
     rng = np.random.default_rng(5)
     to, po = rng.uniform(0, 1.5, count), rng.uniform(0, 2 * np.pi, count)
     shape = at.default_shape(exercise.variant, count)
@@ -164,12 +181,15 @@ def rotation(exercise: Exercise, count: int = 200) -> Finding:
     ti, to = rng.uniform(0, at.HORIZON, (2, count))
     pi, po, turn = rng.uniform(0, 2 * np.pi, (3, count))
     shape = at.default_shape(variant, count)
-    here = Points(ti, pi, to, po, shape)
+    # Of the reflected light next to the horizon the side is not known to rounding.
+    ways = np.asarray(variant.lobe.ways)
+    ti, to = (np.minimum(t, at.HORIZON - 1e-9) for t in (ti, to))
+    here = Points(ti, pi, to, po, shape).along(ways[np.arange(count) % ways.size])
     angles = [p.name for p in variant.shapes if p.scale == "periodic"]
     if angles:
         turn = np.full(count, 0.7)
     turned_shape = {n: v + turn if n in angles else v for n, v in shape.items()}
-    there = Points(ti, pi + turn, to, po + turn, turned_shape)
+    there = Points(here.theta_i, pi + turn, here.theta_o, po + turn, turned_shape)
     # Angles beyond one period are as good as any.
     before, after = exercise.value(here), exercise.value(there)
     size = np.maximum(np.abs(before), 1e-30)
@@ -198,7 +218,8 @@ def compiled_is_plain(exercise: Exercise, count: int = 8) -> Finding:
 
 
 def albedo(exercise: Exercise, count: int) -> Finding:
-    """The directional albedo with all coefficients at 1 keeps ``albedo_bound``."""
+    """The directional albedo with all coefficients at 1 keeps ``albedo_bound``, reflected
+    and transmitted light together, for light from either side."""
     variant = exercise.variant
     bound = variant.lobe.albedo_bound
     if bound is None:
@@ -212,9 +233,19 @@ def albedo(exercise: Exercise, count: int) -> Finding:
 
         def total(shape):
             amplitudes = lobe.amplitudes(shape, tuple(jnp.asarray(c) for c in ones))
-            each = albedo_basis(lobe, shape, _COSINES, azimuth=0.4, nodes=_ALBEDO_NODES)
-            terms = [a * e for a, e in zip(amplitudes, each, strict=True)]
-            return sum(terms[1:], terms[0])
+            sides = []
+            for ways in LEAVING.values():
+                own: list[Way] = [w for w in ways if w in lobe.ways]
+                along = [
+                    albedo_basis(
+                        lobe, shape, _COSINES, azimuth=0.4, nodes=_ALBEDO_NODES, way=way
+                    )
+                    for way in own
+                ]
+                terms = [a * e for of in along for a, e in zip(amplitudes, of, strict=True)]
+                if terms:
+                    sides.append(sum(terms[1:], terms[0]))
+            return jnp.max(jnp.stack(sides), axis=0)
 
         compiled = jax.jit(total, compiler_options=exercise.compiler_options)
         found = np.stack(
@@ -230,6 +261,14 @@ def albedo(exercise: Exercise, count: int) -> Finding:
     if np.any(flat < 0):
         said = f"an albedo is negative: {np.min(flat):.3g}"
     return Finding("albedo", ok, worst, where, said)
+
+
+def _relative_index(exercise: Exercise, points: Points) -> np.ndarray:
+    """Index behind the surface relative to that in front, at every point."""
+    lobe = exercise.variant.lobe
+    with jax.enable_x64(True):
+        own = {n: jnp.asarray(v) for n, v in points.shape.items()}
+        return np.broadcast_to(np.asarray(lobe.relative_index(own)), points.theta_i.shape)
 
 
 def _named(derivatives: dict[str, np.ndarray], mode: str) -> dict[str, np.ndarray]:

@@ -8,6 +8,7 @@ a third of them at azimuth zero, where components vanish. The seed is fixed by t
 
 from __future__ import annotations
 
+import dataclasses
 import zlib
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from fitting.geometry import Geometry, from_angles
 from fitting.models import AxisPeak, SlopeWidths
+from fitting.models.lobe import FROM_BACK, THROUGH
 from fitting.parameters import Parameter
 from fitting.stress.variants import Variant
 
@@ -25,6 +27,9 @@ THETAS_DEG = (0.0, 1e-6, 1e-3, 45.0, 89.0, 89.9, 90 - 1e-6, 90.0)
 WIDTHS = (1e-4, 1e-3, 1e-2, 0.1, 0.5, 1.0, 1.5)
 BLOCK = 250
 _BROAD = 0.2
+# A transmitted pair closer to the horizon is told from a reflected one by rounding alone.
+NEAREST_THROUGH = 1e-7
+_NEAR_PEAK = 0.7
 
 
 @dataclass(frozen=True)
@@ -45,10 +50,25 @@ class Points:
     def below(self, distance: float) -> Points:
         """The same with no direction nearer to the horizon than this angle, rad."""
         most = HORIZON - distance
+
+        def away(theta: np.ndarray) -> np.ndarray:
+            behind = theta > HORIZON
+            return np.where(
+                behind, np.pi - np.minimum(np.pi - theta, most), np.minimum(theta, most)
+            )
+
         return Points(
-            np.minimum(self.theta_i, most),
+            away(self.theta_i), self.phi_i, away(self.theta_o), self.phi_o, self.shape
+        )
+
+    def along(self, way: np.ndarray) -> Points:
+        """The same with the light on these ways (``(n,)`` names), by turning directions to
+        the other side of the sample."""
+        behind_i, behind_o = np.isin(way, FROM_BACK), np.isin(way, ("back", "down"))
+        return Points(
+            np.where(behind_i, np.pi - self.theta_i, self.theta_i),
             self.phi_i,
-            np.minimum(self.theta_o, most),
+            np.where(behind_o, np.pi - self.theta_o, self.theta_o),
             self.phi_o,
             self.shape,
         )
@@ -85,8 +105,62 @@ def stratified(variant: Variant, count: int, *, salt: str = "") -> Points:
         seed = (zlib.crc32(f"{variant}{salt}".encode()), block)
         rng = np.random.default_rng(seed)
         shape = {p.name: _values(p, rng, BLOCK) for p in variant.shapes}
-        parts.append(Points(*_directions(_width(variant, shape), rng, BLOCK), shape))
+        there = Points(*_directions(_width(variant, shape), rng, BLOCK), shape)
+        parts.append(_on_its_ways(variant, there, rng))
     return joined(*parts).chosen(slice(count))
+
+
+def _on_its_ways(variant: Variant, points: Points, rng: np.random.Generator) -> Points:
+    """Points on every way of light that the lobe knows; refracted ones are near its peak
+    where the reflected ones were."""
+    ways = variant.lobe.ways
+    if ways == ("front",):
+        return points
+    way = rng.choice(np.asarray(ways), np.size(points.theta_i))
+    # Nothing goes through along the horizon.
+    through = np.isin(way, THROUGH)
+    away = points.below(NEAREST_THROUGH)
+    points = dataclasses.replace(
+        points,
+        theta_i=np.where(through, away.theta_i, points.theta_i),
+        theta_o=np.where(through, away.theta_o, points.theta_o),
+    )
+    moved = points.along(way)
+    passage = _passage_index(variant, points.shape)
+    if passage is None:
+        return moved
+    index = np.where(way == "down", passage, 1.0 / passage)
+    theta, phi, refracted = _refracted(points, index)
+    use = through & refracted & (rng.random(way.size) < _NEAR_PEAK)
+    return dataclasses.replace(
+        moved,
+        theta_o=np.where(use, np.where(way == "down", np.pi - theta, theta), moved.theta_o),
+        phi_o=np.where(use, phi, moved.phi_o),
+    )
+
+
+def _passage_index(variant: Variant, shape: dict[str, np.ndarray]) -> np.ndarray | None:
+    """The relative index that the lobe refracts with, or None if light goes straight on."""
+    with jax.enable_x64(True):
+        own = {n: jnp.asarray(v) for n, v in shape.items()}
+        passage = jax.vmap(variant.lobe.passage)(own) if own else None
+    if passage is None or passage.eta is None:
+        return None
+    return np.asarray(passage.eta)
+
+
+def _refracted(
+    points: Points, index: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Polar angle to the far normal and azimuth of the light that the facet refracts which
+    would have reflected it to the detector, and whether there is such light."""
+    g = points.geometry
+    cos_t2 = 1.0 - (1.0 - g.cos_d) * (1.0 + g.cos_d) / index**2
+    turn = g.cos_d / index - np.sqrt(np.maximum(cos_t2, 0.0))
+    x, y = turn * g.hx - g.wix / index, turn * g.hy - g.wiy / index
+    z = g.cos_i / index - turn * g.hz
+    seen = np.asarray((cos_t2 > 0) & (z > 1e-9))
+    return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x), seen
 
 
 def product_of_extremes(variant: Variant, count: int) -> Points:
@@ -101,7 +175,8 @@ def product_of_extremes(variant: Variant, count: int) -> Points:
     ]
     phi = rng.choice([0.0, 0.3], count)
     shape = {p.name: rng.choice(extremes(p), count) for p in variant.shapes}
-    return Points(ti[order], phi, to[order], phi + apart[order], shape)
+    points = Points(ti[order], phi, to[order], phi + apart[order], shape)
+    return _on_its_ways(variant, points, rng)
 
 
 def joined(*parts: Points) -> Points:
@@ -134,7 +209,15 @@ def interior(variant: Variant, count: int, *, salt: str = "") -> Points:
     }
     ti, to = rng.uniform(0.02, np.radians(80.0), (2, count))
     pi, po = rng.uniform(0.0, 2 * np.pi, (2, count))
-    return Points(ti, pi, to, po, shape)
+    if variant.lobe.ways == ("front",):
+        return Points(ti, pi, to, po, shape)
+    # The beams of plates are nothing but their peak.
+    near = rng.random(count) < _NEAR_PEAK
+    slope = _width(variant, shape) * rng.uniform(0.1, 2.0, count)
+    theta, phi = _mirrored(ti, slope, rng.uniform(0, 2 * np.pi, count))
+    near &= theta < np.radians(80.0)
+    to, po = np.where(near, theta, to), np.where(near, pi + phi, po)
+    return _on_its_ways(variant, Points(ti, pi, to, po, shape), rng)
 
 
 def default_shape(variant: Variant, count: int) -> dict[str, np.ndarray]:

@@ -167,8 +167,12 @@ def _least(exercise: Exercise, points: Points, components: dict) -> np.ndarray:
     height of the peak and one over both cosines.
     """
     zero = np.zeros_like(points.theta_i)
-    peak = np.max(np.abs(exercise.value(Points(zero, zero, zero, zero, points.shape))), 0)
+    straight = np.where(points.theta_o > at.HORIZON, np.pi, 0.0)
+    back = np.where(points.theta_i > at.HORIZON, np.pi, 0.0)
+    normal = Points(back, zero, straight, zero, points.shape)
+    peak = np.max(np.abs(exercise.value(normal)), 0)
     cosines = components["cos_i"].astype(float) * components["cos_o"].astype(float)
+    cosines = np.abs(cosines)
     times = np.maximum(1.0, np.nan_to_num(peak.astype(float)) / np.maximum(cosines, 1e-30))
     return float(np.finfo(exercise.dtype).tiny) ** _ROOM * times
 

@@ -11,10 +11,12 @@ from data_formats import Channel, Measurement
 from fitting.fitter import fit
 from fitting.geometry import from_angles
 from fitting.model import Model
+from fitting.models import Way
 from fitting.parameters import Parameter
 from fitting.predict import predict_geometry
 from fitting.result import FitResult, load_result
 from fitting.stress.finding import Finding
+from fitting.stress.points import Points
 from fitting.stress.variants import Variant
 
 PARAMETERS = 1e-4
@@ -31,7 +33,7 @@ def self_fit(variant: Variant) -> tuple[Finding, Finding]:
     """
     model = variant.model
     truth = _truth(variant, model)
-    angles = _directions(model.anisotropic)
+    angles = _directions(model.anisotropic, model.ways)
     geometry = from_angles(*angles)
     values = predict_geometry(model, truth, geometry).reshape(len(angles[0]), -1)
     known = {
@@ -129,8 +131,20 @@ def _truth(variant: Variant, model: Model) -> dict[str, np.ndarray]:
     return out
 
 
-def _directions(anisotropic: bool) -> tuple[np.ndarray, ...]:
-    """Rings around the normal for every angle of incidence, finer about the mirror."""
+def _directions(anisotropic: bool, ways: tuple[Way, ...]) -> tuple[np.ndarray, ...]:
+    """Rings around the normal for every angle of incidence, finer about the mirror, on
+    every way of light."""
+    rings = _rings(anisotropic)
+    there = Points(*rings, shape={})
+    each = [there.along(np.full(rings[0].size, way)) for way in ways]
+    return tuple(
+        np.concatenate([getattr(p, name) for p in each])
+        for name in ("theta_i", "phi_i", "theta_o", "phi_o")
+    )
+
+
+def _rings(anisotropic: bool) -> tuple[np.ndarray, ...]:
+    """Of reflected light at the front."""
     rows = []
     phi = np.linspace(0.0, 2 * np.pi if anisotropic else np.pi, 13)[:12]
     for theta_i in np.radians(_THETA_I_DEG):

@@ -87,7 +87,8 @@ def of_name(name: str, *, combined: bool = False) -> list[Variant]:
     ``combined`` adds ``aniso`` together with each of the others that it goes with.
     """
     cls = lobe_class(name)
-    others = [o for o in options_of(cls) if not _is_default(cls, o)]
+    # A lobe turned over is the same one; that turning is right is tested once.
+    others = [o for o in options_of(cls) if o != "back" and not _is_default(cls, o)]
     found = [of_expression(str(Term(name, c))) for c in ((), *((o,) for o in others))]
     if combined and "aniso" in others:
         for pair in itertools.combinations(others, 2):
