@@ -10,6 +10,7 @@ _COMMANDS = {
     "fit": "Fit models to measured reflectance or transmittance and judge the result.",
     "info": "Say what is in a file: geometry, coverage, values, quality.",
     "score": "Measure a fit result against a file, without fitting.",
+    "reflectance": "Reflectances, transmittances and colours of a fit or of a file.",
     "convert": "Write a file of measured reflectance in another format.",
     "models": "List the models, or describe one in full.",
     "formats": "List the file formats, or describe one in full.",
@@ -38,6 +39,16 @@ Examples:
 """,
     "info": "Example: brdf info paint.astm\n",
     "score": "Example: brdf score other_sample.astm paint.fit.json\n",
+    "reflectance": """\
+Examples:
+  brdf reflectance paint.fit.json                         the usual geometries
+  brdf reflectance paint.fit.json -g 8/d -g '8/d SCE' --illuminant A --observer 10
+  brdf reflectance paint.fit.json -g black-sky --theta 30
+  brdf reflectance opal.fit.json -g 'T 0/d' --from back
+  brdf reflectance paint.fit.json --cone 45:0:5,0:0:10    two cones of your own
+  brdf reflectance paint.fit.json -g 45/0 --reference before.fit.json
+  brdf reflectance paint.astm -g 8/d                      the data, without a model
+""",
     "convert": "Example: brdf convert paint.astm paint.csv\n",
     "models": "Examples: brdf models; brdf models ggx\n",
     "formats": "Examples: brdf formats; brdf formats csv\n",

@@ -1,0 +1,100 @@
+"""Basis functions of a lobe at many pairs of directions, compiled for few sizes."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from fitting.geometry import Geometry, from_components
+from fitting.models import Lobe, Shape
+
+SMALL, LARGE = 1 << 12, 1 << 16
+
+
+def basis_values(lobe: Lobe, shape: Shape, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    """``(n, J, C)`` of directions ``(n, 3)``, in 1/sr, in float64.
+
+    Shape parameters are scalars (then C is 1) or ``(C,)``. Rows are padded to one of two
+    sizes, so that a lobe is compiled twice at most.
+    """
+    n = len(wi)
+    out = []
+    with jax.enable_x64(True):
+        own = {k: jnp.asarray(v, jnp.float64) for k, v in shape.items()}
+        for k, size in chunks(n):
+            geometry = padded_geometry(wi[k : k + size], wo[k : k + size], size)
+            values = np.asarray(_basis(lobe, own, geometry))
+            out.append(np.moveaxis(values, -1, 0)[: n - k])
+    return np.concatenate(out)
+
+
+def basis_sums(
+    lobe: Lobe, shape: Shape, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """``sum_k weight_k basis (J, C)`` and its derivative by each shape parameter.
+
+    Derivatives are taken of the sum at fixed nodes, forward, one parameter at a time.
+    """
+    with jax.enable_x64(True):
+        own = {k: jnp.asarray(v, jnp.float64) for k, v in shape.items()}
+        total, slopes = None, {}
+        for k, size in chunks(len(wi)):
+            geometry = padded_geometry(wi[k : k + size], wo[k : k + size], size)
+            w = np.zeros(size)
+            w[: len(weight[k : k + size])] = weight[k : k + size]
+            value, slope = _sums(lobe, own, geometry, jnp.asarray(w))
+            total = np.asarray(value) if total is None else total + np.asarray(value)
+            slopes = {n: slopes.get(n, 0.0) + np.asarray(s) for n, s in slope.items()}
+    assert total is not None
+    return total, slopes
+
+
+def chunks(n: int) -> list[tuple[int, int]]:
+    """First row and padded size of each chunk of ``n`` rows."""
+    if n <= SMALL:
+        return [(0, SMALL)]
+    return [(k, LARGE) for k in range(0, n, LARGE)]
+
+
+def padded_geometry(wi: np.ndarray, wo: np.ndarray, size: int) -> Geometry:
+    """The geometry of some rows, and of the normal for the rest."""
+    columns = []
+    for w in (wi, wo):
+        full = np.zeros((size, 3))
+        full[:, 2] = 1.0
+        full[: len(w)] = w
+        columns += list(full.T.copy())
+    geometry = from_components(*columns)
+    return jax.tree.map(jnp.asarray, geometry)
+
+
+def basis_table(lobe: Lobe, shape: Shape, geometry: Geometry) -> Array:
+    """``(J, C, n)``; C is 1 where all shape parameters are scalars."""
+    if any(jnp.ndim(v) for v in shape.values()):
+        channels = max(jnp.size(v) for v in shape.values())
+        wide = {k: jnp.broadcast_to(v, (channels,)) for k, v in shape.items()}
+        one = jax.vmap(lambda s: jnp.stack(lobe.basis(s, geometry)), out_axes=1)
+        return one(wide)
+    return jnp.stack(lobe.basis(shape, geometry))[:, None, :]
+
+
+@eqx.filter_jit
+def _basis(lobe: Lobe, shape: dict, geometry: Geometry) -> Array:
+    return basis_table(lobe, shape, geometry)
+
+
+@eqx.filter_jit
+def _sums(lobe: Lobe, shape: dict, geometry: Geometry, weight: Array) -> tuple:
+    def total(own: dict) -> Array:
+        return basis_table(lobe, own, geometry) @ weight
+
+    slopes = {}
+    for name in shape:
+        zero = {k: jnp.zeros_like(v) for k, v in shape.items()}
+        # A channel's sum depends on its own value only: one direction for all of them.
+        along = zero | {name: jnp.ones_like(shape[name])}
+        _, slopes[name] = jax.jvp(total, (shape,), (along,))
+    return total(shape), slopes
