@@ -90,16 +90,16 @@ def _interval(p: Array, mu: Array, least2: Array) -> tuple[Array, tuple[Array, A
     root = jnp.sqrt(jnp.where(below > 0, below, 1.0))
     root = jnp.where(below > 0, root, 0.0)
     inside = c > 0
-    starts = jnp.where(inside, 0.0, -c / jnp.where(inside, 1.0, b + root))
-    seen = inside | ((b > 0) & (below > 0))
+    enters = ~inside & (b > 0) & (below > 0)
+    starts = jnp.where(enters, -c / jnp.where(enters, b + root, 1.0), 0.0)
     # Seen from inside: c / (root - b). From outside: (b + root) / -a.
     top = jnp.where(inside, jnp.where(root > b, c, 1.0), jnp.where(a < 0, b + root, 1.0))
     bottom = jnp.where(
         inside, jnp.where(root > b, root - b, 0.0), jnp.where(a < 0, -a, 0.0)
     )
-    nothing = ~seen
+    nothing = ~(inside | enters)
     return (
-        jnp.where(nothing, 0.0, starts),
+        starts,
         (jnp.where(nothing, 0.0, top), jnp.where(nothing, 1.0, bottom)),
     )
 
@@ -119,9 +119,8 @@ def _azimuths(
         return turns, quarter * jnp.tile(w, 4)
     sine2 = (1.0 - mu) * (1.0 + mu)
     outside = (least2 > mu * mu) & (sine2 > 0)
-    cosine = jnp.sqrt(
-        jnp.clip((least2 - mu * mu) / jnp.where(outside, sine2, 1.0), 0.0, 1.0)
-    )
-    end = jnp.where(outside, jnp.arccos(jnp.where(outside, cosine, 0.0)), np.pi)
+    cosine2 = (least2 - mu * mu) / jnp.where(outside, sine2, 1.0)
+    cosine = jnp.sqrt(jnp.where(outside, cosine2, 0.25))
+    end = jnp.where(outside, jnp.arccos(cosine), np.pi)
     share = x * x * (3.0 - 2.0 * x)
     return end * share, 2.0 * end * 6.0 * x * (1.0 - x) * w
