@@ -125,13 +125,14 @@ class Geometry(eqx.Module):
         lib = _library(self.cos_i, self.cos_o)
         down = self.cos_i > 0
         step, twice = eta - 1.0, 2.0 * self.cos_d * eta
-        above = lib.where(down, self.cos_i, self.cos_o)
-        below = lib.where(down, self.cos_o, self.cos_i)
-        return (
-            step * lib.where(down, self.wix, self.wox) - twice * self.hx,
-            step * lib.where(down, self.wiy, self.woy) - twice * self.hy,
-            -eta * below - above,
+        front = (
+            lib.where(down, self.wix, self.wox),
+            lib.where(down, self.wiy, self.woy),
+            lib.where(down, self.cos_i, self.cos_o),
         )
+        half = (self.hx, self.hy, self.hz)
+        x, y, z = (step * f - twice * h for f, h in zip(front, half, strict=True))
+        return x, y, z
 
     def on(self, ways: Container[str]) -> Array:
         """True where the light takes one of these ways: see `fitting.models.lobe.Way`."""

@@ -74,7 +74,7 @@ def rough_dielectric(s, t, o):
     # -(w_f + eta w_b) with w_b = sum - w_f.
     x = (eta - 1) * front[0] - eta * sx
     y = (eta - 1) * front[1] - eta * sy
-    z = -(max(cos_i, cos_o) + eta * min(cos_i, cos_o))
+    z = (eta - 1) * max(cos_i, cos_o) - eta * 2 * mp.cos(t.theta_d) * mp.cos(t.theta_h)
     length = mp.sqrt(x * x + y * y + z * z)
     between = 2 * mp.cos(t.theta_d) ** 2 - 1
     of_front, of_back = -(1 + eta * between) / length, (eta + between) / length
