@@ -50,6 +50,14 @@ class Path:
         return (first, second) if self.from_light else (second, first)
 
 
+def is_broad(lobe: Lobe, shape: Shape, path: Path) -> bool:
+    """Whether a lobe has no peak along a way."""
+    with jax.enable_x64(True):
+        own = {k: jnp.asarray(np.median(np.asarray(v))) for k, v in shape.items()}
+        peak = lobe.passage(own) if path.through else lobe.peak(own)
+    return peak is None
+
+
 def chart_of(
     lobe: Lobe, shape: Shape, fixed: np.ndarray, path: Path
 ) -> tuple[Chart, tuple[Cap, ...]]:

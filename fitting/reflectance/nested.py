@@ -17,7 +17,7 @@ import numpy as np
 from fitting.models import Lobe, Shape
 from fitting.reflectance import rings
 from fitting.reflectance.adapt import Integrals, Sampled, integrate
-from fitting.reflectance.around import Path, chart_of
+from fitting.reflectance.around import Path, chart_of, is_broad
 from fitting.reflectance.beams import (
     Annular,
     Beam,
@@ -25,6 +25,7 @@ from fitting.reflectance.beams import (
     Directional,
     Hemispherical,
     is_thin,
+    projected_solid_angle,
     unit_vector,
 )
 from fitting.reflectance.charts import Polar
@@ -33,7 +34,8 @@ from fitting.reflectance.region import Cap, cap_of, caps_of
 
 Radiance = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
-MOST_NODES = 8_000_000
+MOST_NODES = 4_000_000
+_MOST_OUTER = 10_000
 _RING = 64
 
 
@@ -113,7 +115,7 @@ class _Inner:
 
         return integrate(
             chart, (*caps_of(self.free), *cuts), integrand, self.amplitude,
-            tolerance=tolerance, most=MOST_NODES,
+            tolerance=tolerance, most=MOST_NODES, careful=len(fixed) == 1,
         )  # fmt: skip
 
     def _at_direction(self, fixed: np.ndarray) -> Integrals:
@@ -152,9 +154,11 @@ def _light_first(lobe: Lobe, s: Setting) -> bool:
         isinstance(b, Hemispherical) and b.exclude is None
         for b in (s.incident, s.collected)
     ]
-    # Over a whole hemisphere an isotropic lobe depends on the polar angle only.
-    alone = whole[0] and not whole[1] and s.radiance is None and _isotropic(lobe)
-    return not alone
+    if any(whole) and s.radiance is None and _isotropic(lobe):
+        # Over a whole hemisphere such a lobe depends on the polar angle only.
+        return whole[1]
+    # The inner integral is the one that follows the lobe: the wider beam's.
+    return projected_solid_angle(s.incident) <= projected_solid_angle(s.collected)
 
 
 def _isotropic(lobe: Lobe) -> bool:
@@ -192,7 +196,8 @@ def _outer(
     amplitude: np.ndarray, tolerance: float,
 ) -> tuple[Integrals, list[rings.Run]]:  # fmt: skip
     """Over both coordinates of the fixed beam, from where the peak enters the free one."""
-    chart, cuts = _seen_from(fixed, free)
+    broad = is_broad(inner.lobe, inner.shape, inner.path)
+    chart, cuts = _seen_from(fixed, fixed if broad else free)
     runs: list[rings.Run] = []
 
     def integrand(_: np.ndarray, direction: np.ndarray) -> Sampled:
@@ -210,7 +215,7 @@ def _outer(
 
     found = integrate(
         chart, (*caps_of(fixed), *cuts), integrand, amplitude,
-        tolerance=0.5 * tolerance, most=MOST_NODES // 400, at_once=1 << 11,
+        tolerance=0.5 * tolerance, most=_MOST_OUTER, at_once=1 << 11,
     )  # fmt: skip
     if radiance is not None:
         light = radiance_at(radiance, found.direction)
@@ -220,6 +225,8 @@ def _outer(
 
 def _seen_from(fixed: Beam, free: Beam) -> tuple[Polar, tuple[Cap, ...]]:
     """Rays from the mirror image of the free cone's axis, and a break at its edge."""
+    if fixed is free and isinstance(fixed, Conical):
+        return Polar(cap_of(fixed, "cut").axis[None], np.zeros(1), 1.0), ()
     cone = free.exclude if isinstance(free, Hemispherical) else free
     if not isinstance(cone, Conical):
         cone = fixed if isinstance(fixed, Conical) else Conical(0.0, 0.0, 90.0)

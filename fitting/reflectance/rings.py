@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fitting.reflectance.adapt import Integrals
+from fitting.reflectance.adapt import SAFETY, Integrals
 from fitting.reflectance.beams import Beam, Conical, Hemispherical
 from fitting.reflectance.panels import GAUSS, KRONROD, NODES
 
@@ -56,7 +56,7 @@ def integrate(
         f = run.found.value.reshape(shape) * measure[..., None, None]
         own = run.found.error.reshape(shape) * measure[..., None, None]
         value = np.einsum("px...,x->p...", f, KRONROD)
-        error = np.abs(value - np.einsum("px...,x->p...", f, GAUSS))
+        error = SAFETY * np.abs(value - np.einsum("px...,x->p...", f, GAUSS))
         own = np.einsum("px...,x->p...", own, KRONROD)
         weight = measure * KRONROD
         done += list(zip(ends, value, error, own, weight, tag, strict=True))
