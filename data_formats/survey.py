@@ -9,6 +9,8 @@ import numpy as np
 from data_formats.measurement import Measurement, Symmetry
 from data_formats.provenance import Note
 
+_ODD = np.uint64(0x9E3779B97F4A7C15)
+
 
 def in_wavelength_order(measurement: Measurement) -> Measurement:
     """Channels in ascending order of wavelength, with a note if they were not."""
@@ -95,5 +97,13 @@ def detect_symmetry(measurement: Measurement) -> Symmetry:
 def repeats(measurement: Measurement) -> int:
     """How many rows have the four angles of an earlier row."""
     m = measurement
-    angles = (a.tolist() for a in (m.theta_i, m.phi_i, m.theta_r, m.phi_r))
-    return m.n_rows - len(set(zip(*angles, strict=True)))
+    mixed = np.zeros(m.n_rows, dtype=np.uint64)
+    for angle in (m.theta_i, m.phi_i, m.theta_r, m.phi_r):
+        mixed ^= (angle + 0.0).view(np.uint64)  # -0.0 is 0.0
+        mixed *= _ODD
+        mixed ^= mixed >> np.uint64(29)
+    # Few rows share the mixture of their angles' bits by chance: those alone are compared.
+    _, first, shared = np.unique(mixed, return_index=True, return_inverse=True)
+    alike = np.bincount(shared, minlength=len(first))[shared] > 1
+    angles = (a[alike].tolist() for a in (m.theta_i, m.phi_i, m.theta_r, m.phi_r))
+    return int(np.count_nonzero(alike)) - len(set(zip(*angles, strict=True)))

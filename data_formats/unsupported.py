@@ -9,10 +9,6 @@ _KNOWN: tuple[tuple[str, re.Pattern[bytes]], ...] = tuple(
     (name, re.compile(pattern, re.MULTILINE))
     for name, pattern in (
         ("a tensor_file container (RGL .bsdf, KAIST .pbsdf)", rb"\Atensor_file\0"),
-        (
-            "a MERL table (.binary)",
-            rb"\A\x5a\0\0\0\x5a\0\0\0(?:\xb4\0\0\0|\x68\x01\0\0)",
-        ),
         ("a Fourier BSDF (SCATFUN)", rb"\ASCATFUN"),
         ("an NVIDIA ARC MBSDF file", rb"\ANVIDIA ARC MBSDF"),
         (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import importlib
-import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -52,6 +51,7 @@ def test_formats_are_listed():
         "astm",
         "csv",
         "hdf5",
+        "merl",
     }
     assert all(info.description.endswith(".") for info in infos.values())
 
@@ -70,7 +70,6 @@ def test_import_loads_neither_jax_nor_scipy():
 
 UNSUPPORTED = {
     "tensor_file": b"tensor_file\0\1\0",
-    "MERL": struct.pack("<3i", 90, 90, 180) + bytes(100),
     "SCATFUN": b"SCATFUN\x01",
     "NVIDIA ARC MBSDF": b"NVIDIA ARC MBSDF V1\n",
     "WindowElement": b'<?xml version="1.0"?>\n<WindowElement xmlns="x">',
@@ -160,8 +159,8 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, small, monkeypatch):
 
 
 def test_an_installed_package_can_add_a_format(tmp_path, small, monkeypatch):
-    plugin = ModuleType("plugin", "MERL from elsewhere.")
-    plugin.NAME, plugin.SUFFIXES = "merl", (".binary",)
+    plugin = ModuleType("plugin", "A format of others.")
+    plugin.NAME, plugin.SUFFIXES = "elsewhere", (".else",)
     plugin.sniff = lambda head: head.startswith(b"tensor_file")
     plugin.read = lambda path: small
 
@@ -173,7 +172,7 @@ def test_an_installed_package_can_add_a_format(tmp_path, small, monkeypatch):
     path = tmp_path / "x.bin"
     path.write_bytes(UNSUPPORTED["tensor_file"])
     assert data_formats.read(path) is small
-    assert data_formats.formats()[-1].name == "merl"
+    assert data_formats.formats()[-1].name == "elsewhere"
 
 
 def test_gzip_is_unwrapped_and_hashed_as_it_is(tmp_path, small):
