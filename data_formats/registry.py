@@ -16,7 +16,7 @@ from data_formats.measurement import Measurement, MeasurementError
 from data_formats.source import Source, load, replacing
 
 # In the order of recognition: the most generic last.
-FORMATS = ("hdf5", "cornell", "merl", "rgl", "astm", "pbrt", "utia", "csv")
+FORMATS = ("hdf5", "cornell", "merl", "rgl", "kaist", "astm", "pbrt", "utia", "csv")
 ENTRY_POINTS = "data_formats"
 
 

@@ -124,7 +124,6 @@ def test_reflectance_factor_table(real_data: Path):
     [
         ("alta", "ALTA"),
         ("fred", "FRED"),
-        ("kaist", "tensor_file"),
         ("speos", "Speos"),
         ("zemax", "Zemax"),
         ("radiance", "WindowElement"),
