@@ -16,7 +16,19 @@ from data_formats.measurement import Measurement, MeasurementError
 from data_formats.source import Source, load, replacing
 
 # In the order of recognition: the most generic last.
-FORMATS = ("hdf5", "cornell", "merl", "rgl", "kaist", "astm", "pbrt", "utia", "csv")
+FORMATS = (
+    "hdf5",
+    "cornell",
+    "merl",
+    "rgl",
+    "kaist",
+    "astm",
+    "zemax",
+    "fred",
+    "pbrt",
+    "utia",
+    "csv",
+)
 ENTRY_POINTS = "data_formats"
 
 
@@ -103,8 +115,10 @@ def write(
     **Raises:** `MeasurementError` if the format is unknown or cannot be written, or the
     file cannot be.
     """
-    module = _named(format) if format is not None else _by_suffix(path)
-    writer = None if module is None else _writer(module)
+    if format is not None:
+        writer = _writer(_named(format))
+    else:
+        writer = next(filter(None, map(_writer, _by_suffix(path))), None)
     if writer is None:
         known = [f"{i.name} ({', '.join(i.suffixes)})" for i in formats() if i.can_write]
         raise MeasurementError(
@@ -135,9 +149,9 @@ def _named(name: str) -> Format:
     return found
 
 
-def _by_suffix(path: str | os.PathLike[str]) -> Format | None:
+def _by_suffix(path: str | os.PathLike[str]) -> list[Format]:
     name = os.fspath(path).lower().removesuffix(".gz")
-    return next((m for m in _all() if name.endswith(tuple(m.SUFFIXES))), None)
+    return [m for m in _all() if name.endswith(tuple(m.SUFFIXES))]
 
 
 def _recognise(source: Source) -> Format:
@@ -149,9 +163,9 @@ def _recognise(source: Source) -> Format:
         raise MeasurementError(
             f"{source.path}: this is {what}; the format is recognised but not supported"
         )
-    module = _by_suffix(source.path)
-    if module is not None:
-        return module
+    if modules := _by_suffix(source.path):
+        # The most generic: it takes what the others would have recognised.
+        return modules[-1]
     known = ", ".join(module.NAME for module in _all())
     raise MeasurementError(
         f"{source.path}: the format is not recognised; the file begins with "

@@ -123,9 +123,7 @@ def test_reflectance_factor_table(real_data: Path):
     ("folder", "word"),
     [
         ("alta", "ALTA"),
-        ("fred", "FRED"),
         ("speos", "Speos"),
-        ("zemax", "Zemax"),
         ("radiance", "WindowElement"),
     ],
 )
