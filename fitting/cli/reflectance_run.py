@@ -15,7 +15,7 @@ from fitting.cli.failures import UsageError
 from fitting.cli.flags import Flags
 from fitting.cli.terminal import stderr
 from fitting.cli.work import Work
-from fitting.colorimetry import ObjectColour
+from fitting.colorimetry import ObjectColour, tristimulus_weights
 from fitting.reflectance import Geometry, named, quantity, surface_of_result
 from fitting.reflectance.beams import Beam, Conical, Directional, Hemispherical
 from fitting.reflectance.luminous import colour_difference, colour_of_factors
@@ -70,6 +70,7 @@ class Report(msgspec.Struct, frozen=True):
 def of_result(path: Path, asked: Asked, reference: Path | None, flags: Flags) -> Report:
     """The quantities of a fitted model."""
     result = load_result(path)
+    _check_colour(asked)
     surface = surface_of_result(result)
     other = surface_of_result(load_result(reference)) if reference else None
     lines: list[Line] = []
@@ -95,6 +96,7 @@ def of_result(path: Path, asked: Asked, reference: Path | None, flags: Flags) ->
 
 def of_file(path: Path, measurement: Measurement, asked: Asked) -> Report:
     """The quantities of measured values, without a model."""
+    _check_colour(asked)
     if asked.cone:
         raise UsageError("--cone: rows are too far apart for cones; fit a model first")
     usual = (DEFAULT_THROUGH if measurement.transmitted.any() else ()) + DEFAULT
@@ -118,6 +120,12 @@ def of_file(path: Path, measurement: Measurement, asked: Asked) -> Report:
         lines.append(Line(geometry.name, geometry.says, found, colour))
     report = _report(path, "measurement", None, at, asked, lines, None)
     return msgspec.structs.replace(report, left_out=refused)
+
+
+def _check_colour(asked: Asked) -> None:
+    """Raises for an unknown illuminant or observer, whether or not a colour follows."""
+    some = np.linspace(400.0, 700.0, 5)
+    tristimulus_weights(some, illuminant=asked.illuminant, observer=asked.observer)
 
 
 def _line(surface: Surface, geometry: Geometry, asked: Asked) -> Line:

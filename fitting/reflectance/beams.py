@@ -108,10 +108,8 @@ def describe(beam: Beam) -> str:
     if isinstance(beam, Annular):
         return f"ring at {beam.theta_deg:g} deg"
     if isinstance(beam, Conical):
-        return (
-            f"cone of {beam.half_angle_deg:g} deg half angle around {beam.theta_deg:g} deg, "
-            f"azimuth {beam.phi_deg:g} deg"
-        )
+        axis = f"{beam.theta_deg:g} deg, azimuth {beam.phi_deg:g} deg"
+        return f"cone of {beam.half_angle_deg:g} deg half angle around {axis}"
     return (
         f"hemisphere without a {describe(beam.exclude)}" if beam.exclude else "hemisphere"
     )

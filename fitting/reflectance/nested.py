@@ -30,6 +30,7 @@ from fitting.reflectance.beams import (
 )
 from fitting.reflectance.charts import Polar
 from fitting.reflectance.kernel import basis_values
+from fitting.reflectance.panels import KRONROD
 from fitting.reflectance.region import Cap, cap_of, caps_of
 
 Radiance = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -215,7 +216,7 @@ def _outer(
 
     found = integrate(
         chart, (*caps_of(fixed), *cuts), integrand, amplitude,
-        tolerance=0.5 * tolerance, most=_MOST_OUTER, at_once=1 << 11,
+        tolerance=0.5 * tolerance, most=_MOST_OUTER, at_once=2 * KRONROD.size**2,
     )  # fmt: skip
     if radiance is not None:
         light = radiance_at(radiance, found.direction)

@@ -19,7 +19,7 @@ from fitting.reflectance.beams import (
     nicodemus_name,
     projected_solid_angle,
 )
-from fitting.reflectance.kernel import basis_sums, basis_table, chunks, padded_geometry
+from fitting.reflectance.kernel import LARGE, basis_sums, basis_table, padded_geometry
 from fitting.reflectance.nested import Nodes, Radiance, Setting, lobe_nodes
 from fitting.reflectance.surface import (
     Surface,
@@ -103,12 +103,10 @@ class Rule:
                 n: jnp.broadcast_to(jnp.asarray(v), total.shape) for n, v in own.items()
             }
             integral = jnp.zeros(())
-            for k, size in chunks(len(nodes.weight)):
-                geometry = padded_geometry(
-                    nodes.wi[k : k + size], nodes.wo[k : k + size], size
-                )
-                w = np.zeros(size)
-                w[: len(nodes.weight[k : k + size])] = nodes.weight[k : k + size]
+            for k in range(0, len(nodes.weight), LARGE):
+                rows = slice(k, k + LARGE)
+                w = jnp.asarray(nodes.weight[rows])
+                geometry = padded_geometry(nodes.wi[rows], nodes.wo[rows], w.size)
                 integral = integral + basis_table(lobe, shape, geometry) @ w
             total = total + jnp.sum(lobe_amplitudes(lobe, wide) * integral, axis=0)
         return self.scale * total

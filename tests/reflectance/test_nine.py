@@ -112,11 +112,9 @@ def test_burley_and_modis():
     burley = clear("burley", roughness=1.0)
     theta = math.degrees(math.acos(0.1))
     assert value(burley, Directional(theta), WHOLE) == pytest.approx(1.380126, abs=2e-6)
-    kernel = surface_of("rtls", {"rtls.f_iso": 0.0, "rtls.f_vol": np.pi, "rtls.f_geo": 0.0})
-    found = quantity(kernel, WHOLE, WHOLE)
-    assert found.value[0] / math.pi == pytest.approx(0.189186, abs=2e-6) or found.value[
-        0
-    ] == pytest.approx(0.189186, abs=2e-6)
+    kernel = {"rtls.f_iso": 0.0, "rtls.f_vol": 1.0, "rtls.f_geo": 0.0}
+    found = value(surface_of("rtls", kernel), WHOLE, WHOLE)
+    assert found == pytest.approx(0.189186, abs=2e-6)
 
 
 GLOSSY = surface_of(
@@ -126,8 +124,12 @@ GLOSSY = surface_of(
 
 
 def test_exchanged_beams_have_the_same_factor():
-    for one, other in [(Directional(40.0), WHOLE), (Conical(30.0, 0.0, 10.0), WHOLE),
-                       (Directional(8.0), Hemispherical(Conical(8.0, 180.0, 8.0)))]:  # fmt: skip
+    pairs = [
+        (Directional(40.0), WHOLE),
+        (Conical(30.0, 0.0, 10.0), WHOLE),
+        (Directional(8.0), Hemispherical(Conical(8.0, 180.0, 8.0))),
+    ]
+    for one, other in pairs:
         forth, back = quantity(GLOSSY, one, other), quantity(GLOSSY, other, one)
         assert forth.factor[0] == pytest.approx(back.factor[0], rel=3e-6)
 
@@ -205,7 +207,8 @@ def test_a_sky_of_cosines():
     def sky(theta, phi):
         return np.cos(theta) ** 3
 
-    assert value(DIFFUSE, WHOLE, WHOLE, radiance=sky) == pytest.approx(0.7, rel=1e-6)
+    found = value(DIFFUSE, WHOLE, WHOLE, radiance=sky, tolerance=1e-4)
+    assert found == pytest.approx(0.7, rel=1e-6)
     found = value(DIFFUSE, Conical(0.0, 0.0, 30.0), Directional(20.0), radiance=sky)
     assert found == pytest.approx(0.7 / np.pi, rel=1e-6)
     # E(mu) = 2 mu^(k - 1) / (k + 1) of Minnaert for light from mu, weighted by mu^3.
@@ -214,4 +217,5 @@ def test_a_sky_of_cosines():
     e1, e4 = (value(minnaert, Directional(t), WHOLE) for t in at)
     k = math.log(e1 / e4) / math.log(4.0)
     mean = e1 * 5.0 / (5.0 + k)
-    assert value(minnaert, WHOLE, WHOLE, radiance=sky) == pytest.approx(mean, rel=3e-6)
+    found = value(minnaert, WHOLE, WHOLE, radiance=sky, tolerance=1e-4)
+    assert found == pytest.approx(mean, rel=1e-5)
