@@ -25,6 +25,8 @@ FORMATS = (
     "astm",
     "zemax",
     "fred",
+    "speos",
+    "mbsdf",
     "pbrt",
     "utia",
     "csv",

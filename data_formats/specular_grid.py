@@ -74,7 +74,8 @@ def first_of_repeats(
     """
     sin, cos = np.sin(angles), np.cos(angles)
     vectors = [sin[:, ::2] * cos[:, 1::2], sin[:, ::2] * sin[:, 1::2], cos[:, ::2]]
-    mantissa, exponent = np.frexp(value)
+    # NaN would differ from NaN, and 1/3 from 0.33333333333333337.
+    mantissa, exponent = np.frexp(np.where(np.isnan(value), np.inf, value))
     # Adding 0 turns -0 into 0.
     directions = [np.round(v, 9) + 0.0 for v in vectors]
     keys = np.hstack([*directions, np.ldexp(np.round(mantissa, 12), exponent) + 0.0])

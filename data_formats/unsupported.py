@@ -10,7 +10,6 @@ _KNOWN: tuple[tuple[str, re.Pattern[bytes]], ...] = tuple(
     for name, pattern in (
         ("a tensor_file container (RGL .bsdf, KAIST .pbsdf)", rb"\Atensor_file\0"),
         ("a Fourier BSDF (SCATFUN)", rb"\ASCATFUN"),
-        ("an NVIDIA ARC MBSDF file", rb"\ANVIDIA ARC MBSDF"),
         (
             "a BSDF XML file (WindowElement)",
             rb"\A(?:\xef\xbb\xbf)?\s*<(?s:.*)<WindowElement",
@@ -19,7 +18,6 @@ _KNOWN: tuple[tuple[str, re.Pattern[bytes]], ...] = tuple(
         ("an ALTA function file (#FUNC)", rb"^#FUNC\b"),
         ("a LightTools BSDF file (ScatterRadial)", rb"^[ \t]*ScatterRadial[ \t]+\d"),
         ("an RPC Photonics table (!!BSDF Data)", rb"^!!BSDF Data"),
-        ("a Speos / OPTIS file", rb"\A(?:\xef\xbb\xbf)?OPTIS - "),
         ("an SSDD file (DATA_TYPE)", rb"^DATA_TYPE[ \t]+(?:brdf|btdf|specular)"),
         ("a pgII scan of pab-opto", rb"^#(?:intheta|incident_angle|theta_in|format:)"),
         (

@@ -128,7 +128,9 @@ def speos_table(incidence: float, behind: bool, factor: float, zeros: int = 0) -
     value = factor * bsdf(
         unit(incidence, 180.0)[:, None, None], unit(theta[:, None], phi[None])
     )
-    value[0 if behind else -1, :zeros] = 0
+    edge = value[0 if behind else -1]
+    if zeros:
+        edge[:zeros] = edge[-1] = 0
     table = np.column_stack([theta, value])
     phis = "\t" + "\t".join(map(str, phi))
     return [f"{len(theta)} {len(phi)}", phis, *lines_of(table)]

@@ -71,12 +71,10 @@ def test_import_loads_neither_jax_nor_scipy():
 UNSUPPORTED = {
     "tensor_file": b"tensor_file\0\1\0",
     "SCATFUN": b"SCATFUN\x01",
-    "NVIDIA ARC MBSDF": b"NVIDIA ARC MBSDF V1\n",
     "WindowElement": b'<?xml version="1.0"?>\n<WindowElement xmlns="x">',
     "ALTA data": b"# comment\n#DIM 1 1\n0.1 0.2\n",
     "ALTA function": b"#FUNC nonlinear_function_lafortune\n",
     "LightTools": b"Symmetry Asymmetric\nScatterRadial 2\n0 10\nDataBegin\n",
-    "Speos": b"OPTIS - Anisotropic BSDF surface file v8.0\n0\n",
     "SSDD": b"VERSION 0.2\nDATA_TYPE brdf\n",
     "pgII": b'#sample_name "x"\n#intheta 30\n0 0 1\n',
     "Disney": b"analytic\n::begin parameters\n",

@@ -123,7 +123,6 @@ def test_reflectance_factor_table(real_data: Path):
     ("folder", "word"),
     [
         ("alta", "ALTA"),
-        ("speos", "Speos"),
         ("radiance", "WindowElement"),
     ],
 )
