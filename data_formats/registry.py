@@ -22,6 +22,7 @@ FORMATS = (
     "merl",
     "rgl",
     "kaist",
+    "window",
     "astm",
     "zemax",
     "fred",

@@ -10,10 +10,6 @@ _KNOWN: tuple[tuple[str, re.Pattern[bytes]], ...] = tuple(
     for name, pattern in (
         ("a tensor_file container (RGL .bsdf, KAIST .pbsdf)", rb"\Atensor_file\0"),
         ("a Fourier BSDF (SCATFUN)", rb"\ASCATFUN"),
-        (
-            "a BSDF XML file (WindowElement)",
-            rb"\A(?:\xef\xbb\xbf)?\s*<(?s:.*)<WindowElement",
-        ),
         ("an ALTA data file (#DIM)", rb"^#DIM\b"),
         ("an ALTA function file (#FUNC)", rb"^#FUNC\b"),
         ("a LightTools BSDF file (ScatterRadial)", rb"^[ \t]*ScatterRadial[ \t]+\d"),

@@ -71,7 +71,6 @@ def test_import_loads_neither_jax_nor_scipy():
 UNSUPPORTED = {
     "tensor_file": b"tensor_file\0\1\0",
     "SCATFUN": b"SCATFUN\x01",
-    "WindowElement": b'<?xml version="1.0"?>\n<WindowElement xmlns="x">',
     "ALTA data": b"# comment\n#DIM 1 1\n0.1 0.2\n",
     "ALTA function": b"#FUNC nonlinear_function_lafortune\n",
     "LightTools": b"Symmetry Asymmetric\nScatterRadial 2\n0 10\nDataBegin\n",

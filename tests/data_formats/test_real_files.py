@@ -123,7 +123,6 @@ def test_reflectance_factor_table(real_data: Path):
     ("folder", "word"),
     [
         ("alta", "ALTA"),
-        ("radiance", "WindowElement"),
     ],
 )
 def test_other_formats_are_refused_by_name(real_data: Path, folder, word):
