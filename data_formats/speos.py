@@ -92,15 +92,9 @@ def read(path: str | os.PathLike[str], *, scale: Scale = "as-written") -> Measur
         raise MeasurementError(f"scale is {scale!r}; expected one of {known}")
     source = load(path)
     header, anisotropic, lines = _header(source)
-    parts = [
-        _Part(name)
-        for name, flag in zip(
-            ("reflection", "transmission"),
-            lines.numbers("two flags, reflection and transmission", 2),
-            strict=True,
-        )
-        if flag
-    ]
+    flags = lines.numbers("two flags, reflection and transmission", 2)
+    names = ("reflection", "transmission")
+    parts = [_Part(name) for name, flag in zip(names, flags, strict=True) if flag]
     if not parts:
         raise MeasurementError(f"{lines.where}: the file says that it holds no data (0 0)")
     kind = lines.numbers("the type of values", 1)[0]
@@ -108,9 +102,7 @@ def read(path: str | os.PathLike[str], *, scale: Scale = "as-written") -> Measur
         raise MeasurementError(
             f"{lines.where}: the type of values is {kind:g}; expected 1 or 0"
         )
-    header["type of values"] = "BSDF" if kind else "intensity"
-    read_tables = _anisotropic if anisotropic else _spectral
-    channels, grids = read_tables(lines, parts, header)
+    channels, grids = (_anisotropic if anisotropic else _spectral)(lines, parts, header)
     lines.expect_end()
     notes: list[Note] = []
     if not kind:
@@ -222,7 +214,7 @@ def _grid(
                 f"expected {low} to {high}"
             )
     table = np.array(rows, dtype=np.float64)
-    return _Grid(part, geometry, channel, percent, table[:, 0], np.array(phi), table[:, 1:])
+    return _Grid(part, geometry, percent, table[:, 0], np.array(phi), table[:, 1:])
 
 
 def _factor(grid: _Grid, grids: Sequence[_Grid]) -> float:
