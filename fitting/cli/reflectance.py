@@ -56,7 +56,7 @@ def reflectance(
     ] = 8.0,
     tolerance: Annotated[
         float, Parameter(help="Of the quadrature, relative to the largest channel.")
-    ] = 1e-6,
+    ] = 1e-5,
     reference: Annotated[
         Path | None, Parameter(help="Another result, for colour differences from it.")
     ] = None,

@@ -34,13 +34,17 @@ def show(out: Console, report: Report, flags: Flags) -> None:
 
 
 def _summary(out: Console, report: Report) -> None:
-    columns = ["geometry", "factor, mean", "Y/100", "L*", "a*", "b*", "sRGB"]
+    coloured = any(line.colour is not None for line in report.quantities)
+    columns = ["geometry", "mean factor"]
+    if coloured:
+        columns = ["geometry", "Y/100", "L*", "a*", "b*", "sRGB"]
     compared = any(line.delta_e_2000 is not None for line in report.quantities)
     rows = table(*columns, *(["dE2000"] if compared else []))
     for line in report.quantities:
-        found = line.reflectance
-        mean = sum(found.factor) / len(found.factor)
-        cells = [line.geometry, number(mean), *_colour_cells(line.colour)]
+        factor = line.reflectance.factor
+        cells = [line.geometry, number(sum(factor) / len(factor))]
+        if coloured:
+            cells = [line.geometry, *_colour_cells(line.colour)]
         if compared:
             cells.append(number(line.delta_e_2000, 3))
         rows.add_row(*cells)

@@ -169,6 +169,11 @@ def _geometries(asked: Asked, surface: Surface) -> list[Geometry]:
             chosen += DEFAULT
         if way_of(asked.side, True) in ways:
             chosen += DEFAULT_THROUGH
+        if not chosen:
+            raise UsageError(
+                f"--from {asked.side}: {surface.model.expression!r} does nothing with "
+                "such light" + (" behind the sample" if asked.transmitted else "")
+            )
     return _named(chosen, asked) + [_of_cones(text, asked) for text in asked.cone]
 
 

@@ -48,11 +48,21 @@ def test_json(run, fitted):
     found = json.loads(out)
     assert (found["illuminant"], found["kind"]) == ("D65", "model")
     first, second = found["quantities"]
-    expected = quantity(fitted.result, Directional(8.0), Hemispherical())
+    beams = Directional(8.0), Hemispherical()
+    expected = quantity(fitted.result, *beams, tolerance=1e-5)
     assert first["reflectance"]["value"] == expected.value
     assert first["reflectance"]["standard_uncertainty"] == expected.standard_uncertainty
     assert first["colour"]["luminous_reflectance_uncertainty"] > 0
     assert second["reflectance"]["name"] == "bidirectional"
+
+
+def test_without_colour(run):
+    Path("t.csv").write_text("theta_i_deg,theta_r_deg,phi_r_deg,mono\n45,0,0,0.3\n")
+    code, out, _ = run("t.csv", "-g", "45/0")
+    assert code == 0
+    assert "mean factor" in out
+    assert "no colour" in out
+    assert "0.9425" in out
 
 
 def test_reference(run, fitted):
@@ -89,6 +99,8 @@ def test_file(run):
     [
         (("-g", "9/x"), 2, "known: 45/0"),
         (("-g", "T 0/d"), 2, "transmits no light"),
+        (("--from", "back"), 2, "does nothing with such light"),
+        (("--transmitted",), 2, "behind the sample"),
         (("-g", "8/d", "--illuminant", "D66"), 2, "illuminant"),
         (("--cone", "45:0"), 2, "INCIDENT,COLLECTED"),
         (("--cone", "45:x,0"), 2, "is no beam"),
