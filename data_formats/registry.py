@@ -28,6 +28,8 @@ FORMATS = (
     "fred",
     "speos",
     "mbsdf",
+    "pgii",
+    "ssdd",
     "pbrt",
     "utia",
     "csv",

@@ -14,8 +14,6 @@ _KNOWN: tuple[tuple[str, re.Pattern[bytes]], ...] = tuple(
         ("an ALTA function file (#FUNC)", rb"^#FUNC\b"),
         ("a LightTools BSDF file (ScatterRadial)", rb"^[ \t]*ScatterRadial[ \t]+\d"),
         ("an RPC Photonics table (!!BSDF Data)", rb"^!!BSDF Data"),
-        ("an SSDD file (DATA_TYPE)", rb"^DATA_TYPE[ \t]+(?:brdf|btdf|specular)"),
-        ("a pgII scan of pab-opto", rb"^#(?:intheta|incident_angle|theta_in|format:)"),
         (
             "a Disney BRDF Explorer function (GLSL, no measurement)",
             rb"\A\s*(?:analytic\b|::begin)",

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import made_up_optics
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -286,6 +287,9 @@ def sound_files(tmp_path, write_astm, shadowed_rows, ramped_rows) -> list[Path]:
         path = folder / f"version_{version}_{packed}.mat"
         savemat(path, table, format=version, do_compression=packed)
         files.append(path)
+    for name, content in made_up_optics.SOUND.items():
+        (folder / name).write_bytes(content)
+        files.append(folder / name)
     return [*files, folder / "stream.brdf"]
 
 
@@ -318,6 +322,6 @@ def test_many_mutated_files(sound_files, tmp_path, seed):
 
 @pytest.mark.slow
 def test_mutated_real_files(real_data, tmp_path):
-    folders = ("cornell", "minidiff", "pbrt", "csv")
+    folders = ("cornell", "minidiff", "pbrt", "csv", "zemax", "fred", "speos", "mbsdf")
     files = [sorted((real_data / folder).iterdir())[-1] for folder in folders]
     mutate_and_read(files, tmp_path, seconds=60, seed=0)

@@ -74,8 +74,6 @@ UNSUPPORTED = {
     "ALTA data": b"# comment\n#DIM 1 1\n0.1 0.2\n",
     "ALTA function": b"#FUNC nonlinear_function_lafortune\n",
     "LightTools": b"Symmetry Asymmetric\nScatterRadial 2\n0 10\nDataBegin\n",
-    "SSDD": b"VERSION 0.2\nDATA_TYPE brdf\n",
-    "pgII": b'#sample_name "x"\n#intheta 30\n0 0 1\n',
     "Disney": b"analytic\n::begin parameters\n",
     ".xlsx": b"PK\x03\x04\x14\0",
 }
