@@ -23,6 +23,7 @@ FORMATS = (
     "rgl",
     "kaist",
     "window",
+    "alta",
     "astm",
     "zemax",
     "fred",

@@ -10,7 +10,6 @@ _KNOWN: tuple[tuple[str, re.Pattern[bytes]], ...] = tuple(
     for name, pattern in (
         ("a tensor_file container (RGL .bsdf, KAIST .pbsdf)", rb"\Atensor_file\0"),
         ("a Fourier BSDF (SCATFUN)", rb"\ASCATFUN"),
-        ("an ALTA data file (#DIM)", rb"^#DIM\b"),
         ("an ALTA function file (#FUNC)", rb"^#FUNC\b"),
         ("a LightTools BSDF file (ScatterRadial)", rb"^[ \t]*ScatterRadial[ \t]+\d"),
         ("an RPC Photonics table (!!BSDF Data)", rb"^!!BSDF Data"),

@@ -48,6 +48,7 @@ def test_formats_are_listed():
     infos = {info.name: info for info in data_formats.formats()}
     assert tuple(infos) == registry.FORMATS
     assert {name for name, info in infos.items() if info.can_write} == {
+        "alta",
         "astm",
         "csv",
         "hdf5",
@@ -71,8 +72,7 @@ def test_import_loads_neither_jax_nor_scipy():
 UNSUPPORTED = {
     "tensor_file": b"tensor_file\0\1\0",
     "SCATFUN": b"SCATFUN\x01",
-    "ALTA data": b"# comment\n#DIM 1 1\n0.1 0.2\n",
-    "ALTA function": b"#FUNC nonlinear_function_lafortune\n",
+    "ALTA function": b"#DIM 2 1\n#FUNC nonlinear_function_lafortune\n",
     "LightTools": b"Symmetry Asymmetric\nScatterRadial 2\n0 10\nDataBegin\n",
     "Disney": b"analytic\n::begin parameters\n",
     ".xlsx": b"PK\x03\x04\x14\0",
