@@ -16,9 +16,10 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from data_formats.angle_grid import on_grid
 from data_formats.measurement import Channel, Measurement, MeasurementError, Provenance
 from data_formats.provenance import Note, one_line
-from data_formats.source import Source, load
+from data_formats.source import Source, load, write_bytes
 from data_formats.specular_grid import columns_of
 from data_formats.table import Table, to_measurement
 
@@ -34,6 +35,8 @@ _PARTS = {
 _CHANNELS = (("mono",), ("R", "G", "B"))
 _FIELD = re.compile(r'(\w+)\s*=\s*"?(.*?)"?')
 _LONGEST_LINE = 10_000
+# Degrees.
+_OFF_CENTRE = 1e-6
 
 
 def sniff(head: bytes) -> bool:
@@ -77,6 +80,48 @@ def read(path: str | os.PathLike[str]) -> Measurement:
         ),
         quantity="bsdf",
     )
+
+
+def write(measurement: Measurement, path: str | os.PathLike[str]) -> None:
+    """Write a measured BSDF of MDL: float32 values at the centres of equal cells.
+
+    **Raises:** `MeasurementError` if the directions are not those of the cells' centres,
+    the channels are not one or R G B, or values are masked that are not copies at grazing.
+    """
+    m = measurement
+    names = tuple(c.name for c in m.channels)
+    if m.n_channels > 1 and names != _CHANNELS[1]:
+        raise MeasurementError(
+            f"MBSDF holds one channel, or R G B; the channels are {', '.join(names)[:100]}"
+        )
+    content = _TITLE + b"\n"
+    for part, rows in (("reflection", ~m.transmitted), ("transmission", m.transmitted)):
+        if not rows.any():
+            continue
+        some = m.select(rows)
+        grid = on_grid(some, "MBSDF")
+        table = grid.value[:, 0].astype("<f4")
+        n_theta, _, n_phi, n_channels = table.shape
+        centres = (np.arange(n_theta) + 0.5) * 90 / n_theta
+        asked = (centres, np.zeros(1), centres, (np.arange(n_phi) + 0.5) * 180 / n_phi)
+        axes = (grid.theta_i, grid.phi_i, grid.theta_r, grid.phi_r)
+        if not all(
+            len(a) == len(b) and np.abs(a - b).max() < _OFF_CENTRE
+            for a, b in zip(axes, asked, strict=True)
+        ):
+            raise MeasurementError(
+                f"MBSDF holds values at the centres of equal cells of theta from 0 to 90 "
+                f"and phi from 0 to 180 degrees; the {part} has other angles; write csv"
+            )
+        seen = _rows(part, table.astype(np.float64), [])[:, 4 + n_channels :]
+        if np.count_nonzero(seen == 0) != np.count_nonzero(~some.valid):
+            raise MeasurementError(
+                "MBSDF has no masks, and values of this measurement are masked; write csv"
+            )
+        content += f"MBSDF_DATA_{part.upper()}=\n".encode()
+        content += np.array([n_channels == 3, n_theta, n_phi], "<u4").tobytes()
+        content += table.tobytes() + b"\n"
+    write_bytes(path, content)
 
 
 def _tables(source: Source) -> tuple[dict[str, str], dict[str, NDArray[np.float64]]]:

@@ -143,7 +143,11 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write UTF-8 text with LF line ends; compressed if the name ends in `.gz`."""
-    data = text.encode("utf-8")
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write a file; compressed if the name ends in `.gz`."""
     if os.fspath(path).lower().endswith(".gz"):
         data = gzip.compress(data, mtime=0)
     Path(path).write_bytes(data)

@@ -24,15 +24,15 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from data_formats.angle_grid import on_grid
 from data_formats.half_difference import directions
 from data_formats.measurement import Channel, Measurement, MeasurementError, Provenance
 from data_formats.provenance import Note, one_line
-from data_formats.source import Source, load, split_lines
+from data_formats.source import load, write_text
 from data_formats.specular_grid import (
     above_horizon,
     around_specular,
@@ -40,44 +40,18 @@ from data_formats.specular_grid import (
     first_of_repeats,
     left_out_below,
 )
+from data_formats.ssdd_blocks import COLORS, SPECULAR, Block, blocks_of
 from data_formats.table import Table, to_measurement
-from data_formats.token_stream import Tokens, number_or_none
 
 NAME = "ssdd"
 SUFFIXES = (".ssdd",)
 
 _MARK = re.compile(rb"^DATA_TYPE[ \t]+(?:brdf|btdf|specular_\w+)", re.MULTILINE)
-_KEYS = re.compile(
-    r"VERSION|SOFTWARE|API|DATE|DATA_TYPE|COLOR_MODEL|WAVELENGTH_LIST|PARAM_TYPE"
-    r"|REDUCTION_TYPE|PARAM[0-4]_LIST|NAME|SOURCE_TYPE|DEVICE|CREATION_DATE"
-    r"|MEASUREMENT_DATE|DATA"
-)
-_LISTS = tuple(f"PARAM{k}_LIST" for k in range(5))
-_COLORS = {"monochrome": ("mono",), "rgb": ("R", "G", "B"), "xyz": ("X", "Y", "Z")}
-_SPECULAR = ("specular_reflectance", "specular_transmittance")
-# Of PARAM0 to PARAM3, in degrees.
-_MOST = {
-    "spherical_coordinate_system": (90, 360, 90, 360),
-    "specular_coordinate_system": (90, 360, 180, 360),
-    "half_difference_coordinate_system": (90, 360, 90, 360),
-}
-_LONGEST_LINE = 1_000_000
 
 
 def sniff(head: bytes) -> bool:
     """Whether a line is `DATA_TYPE` and one of the types."""
     return _MARK.search(head.replace(b"\r", b"\n")) is not None
-
-
-@dataclass(frozen=True)
-class _Block:
-    """A table: its keywords, channels, the lists of angles in radians and the values."""
-
-    kind: str
-    fields: dict[str, str]
-    channels: tuple[Channel, ...]
-    angles: tuple[NDArray[np.float64], ...]
-    value: NDArray[np.float64]
 
 
 def read(path: str | os.PathLike[str]) -> Measurement:
@@ -90,11 +64,11 @@ def read(path: str | os.PathLike[str]) -> Measurement:
     **Raises:** `MeasurementError` with file and line.
     """
     source = load(path)
-    header, blocks = _blocks(source)
+    header, blocks = blocks_of(source)
     notes = [Note("degrees-converted", "Angles converted from degrees to radians")]
-    kept = [b for b in blocks if b.kind not in _SPECULAR]
+    kept = [b for b in blocks if b.kind not in SPECULAR]
     if len(kept) < len(blocks):
-        left = ", ".join(b.kind for b in blocks if b.kind in _SPECULAR)
+        left = ", ".join(b.kind for b in blocks if b.kind in SPECULAR)
         notes.append(
             Note(
                 "specular-left-out",
@@ -132,136 +106,68 @@ def read(path: str | os.PathLike[str]) -> Measurement:
     )
 
 
-def _blocks(source: Source) -> tuple[dict[str, str], list[_Block]]:
-    """The header of the file and its tables."""
-    data = source.data.removeprefix(b"\xef\xbb\xbf")
-    header: dict[str, str] = {}
-    fields = header
-    blocks: list[_Block] = []
-    offset, number = 0, 0
-    while offset < len(data):
-        end = data.find(b"\n", offset, offset + _LONGEST_LINE)
-        end = min(offset + _LONGEST_LINE, len(data)) if end < 0 else end
-        number += 1
-        line = data[offset:end].decode("utf-8", errors="replace").strip()
-        offset = end + 1
-        where = f"{source.path}, line {number}"
-        key, _, text = line.partition(" ")
-        if not line or key.startswith("#"):
-            continue
-        if not _KEYS.fullmatch(key):
-            raise MeasurementError(
-                f"{where}: found {line[:30]!r}; expected a keyword such as VERSION, "
-                "DATA_TYPE or PARAM0_LIST"
-            )
-        if key == "DATA_TYPE":
-            fields = {}
-        fields[key] = text.strip()
-        if key == "DATA":
-            block, offset, number = _block(fields, source.path, where, data, offset, number)
-            blocks.append(block)
-            fields = {}
-    if not blocks or (fields and fields is not header):
+def write(measurement: Measurement, path: str | os.PathLike[str]) -> None:
+    """Write a SSDD file in spherical coordinates, as text in full precision.
+
+    Angles are rounded to 1e-9 degrees. Rows without a valid value are not written.
+
+    **Raises:** `MeasurementError` if the rows of reflected or of transmitted light are no
+    complete grid, a row is valid in some channels only, or the channels are not one, R G B,
+    X Y Z or wavelengths.
+    """
+    m = measurement.select(measurement.valid.any(axis=1))
+    if not m.n_rows or not m.valid.all():
         raise MeasurementError(
-            f"{source.path}: a table lacks its DATA; is the file cut short?"
+            "SSDD holds rows that are valid in all channels; "
+            f"{int((~m.valid).any(axis=1).sum())} rows are in some only; write csv"
         )
-    return {k: one_line(v) for k, v in header.items()}, blocks
+    lines = ["VERSION 0.2"]
+    for kind, rows in (("brdf", ~m.transmitted), ("btdf", m.transmitted)):
+        if rows.any():
+            lines += _table(m.select(rows), kind)
+    write_text(path, "\n".join([*lines, ""]))
 
 
-def _block(
-    fields: dict[str, str], path: str, where: str, data: bytes, offset: int, number: int
-) -> tuple[_Block, int, int]:
-    """A table whose values begin at an offset; the offset and the line after it."""
-    kind = fields.get("DATA_TYPE", "")
-    if kind not in ("brdf", "btdf", *_SPECULAR):
-        raise MeasurementError(f"{where}: DATA without a known DATA_TYPE before it")
-    system = fields.get("PARAM_TYPE", "spherical_coordinate_system")
-    if system not in _MOST or ("PARAM_TYPE" not in fields and kind not in _SPECULAR):
+def _table(m: Measurement, kind: str) -> list[str]:
+    """The lines of a table."""
+    grid = on_grid(m, "SSDD")
+    phi_r, value = grid.phi_r, grid.value
+    if len(phi_r) > 1 and phi_r[0] == 0 and phi_r[-1] > 180:
+        # Programs interpolate between the angles of the list, so it closes the circle.
+        phi_r = np.append(phi_r, 360.0)
+        value = np.concatenate([value, value[:, :, :, :1]], axis=3)
+    lists = [grid.theta_i, grid.phi_i, grid.theta_r, phi_r]
+    lines = ["", f"DATA_TYPE {kind}", *_colors(m.channels)]
+    lines.append("PARAM_TYPE spherical_coordinate_system")
+    if m.symmetry == "bilateral" and phi_r[-1] <= 180:
+        lines.append("REDUCTION_TYPE bilateral_symmetry")
+    for k, angles in enumerate(lists):
+        if k != 1 or m.symmetry == "anisotropic":
+            lines.append(f"PARAM{k}_LIST " + " ".join(f"{x:.13g}" for x in angles))
+    p = m.provenance
+    named = {"NAME": p.sample, "DEVICE": p.instrument, "MEASUREMENT_DATE": p.date}
+    lines += [f"{key} {one_line(text)}" for key, text in named.items() if one_line(text)]
+    table = np.transpose(value, (3, 2, 1, 0, 4)).reshape(-1, m.n_channels)
+    rows = [" ".join(map(repr, row)) for row in table.tolist()]
+    return [*lines, "DATA ascii", *rows]
+
+
+def _colors(channels: tuple[Channel, ...]) -> list[str]:
+    names = tuple(c.name for c in channels)
+    wavelengths = [c.wavelength_nm for c in channels if c.wavelength_nm is not None]
+    if len(wavelengths) == len(channels):
+        listed = " ".join(map(repr, wavelengths))
+        return ["COLOR_MODEL spectrum", f"WAVELENGTH_LIST {listed}"]
+    model = next((k for k, v in COLORS.items() if v == names), "monochrome")
+    if model == "monochrome" and len(channels) > 1:
         raise MeasurementError(
-            f"{where}: PARAM_TYPE of the {kind} is {fields.get('PARAM_TYPE', '')[:40]!r}; "
-            f"expected one of {', '.join(_MOST)}"
+            "SSDD holds one channel, R G B, X Y Z or wavelengths; the channels are "
+            f"{', '.join(names)[:100]}"
         )
-    channels = _channels(fields, where)
-    angles = tuple(_angles(fields, key, where) for key in _LISTS)
-    limits = (*_MOST[system], 90)
-    widest = [float(np.rad2deg(np.abs(a).max())) for a in angles]
-    for key, found, most in zip(_LISTS, widest, limits, strict=True):
-        if found > most + 1e-6:
-            raise MeasurementError(
-                f"{where}: {key} of the {kind} has {found:g}; expected at most {most} "
-                "degrees"
-            )
-    if "PARAM4_LIST" in fields and len(angles[4]) != len(angles[0]):
-        raise MeasurementError(
-            f"{where}: PARAM4_LIST has {len(angles[4])} angles; expected as many as "
-            f"PARAM0_LIST, {len(angles[0])}"
-        )
-    size = len(channels) * int(np.prod([len(a) for a in angles[:4]], dtype=object))
-    mode = fields["DATA"]
-    if mode == "binary":
-        if len(data) - offset < 4 * size:
-            raise MeasurementError(
-                f"{where}: {len(data) - offset} bytes follow; {size} values have {4 * size}"
-            )
-        value = np.frombuffer(data, "<f4", size, offset).astype(np.float64)
-        offset += 4 * size
-    elif mode == "ascii":
-        end = data.find(b"DATA_TYPE", offset)
-        end = len(data) if end < 0 else end
-        lines = split_lines(data[offset:end].decode("utf-8", errors="replace"))
-        tokens = Tokens.of(path, lines, number + 1)
-        if len(tokens.words) != size:
-            raise MeasurementError(
-                f"{where}: {len(tokens.words)} values follow; expected {size}, the product "
-                "of the lengths of the lists and the number of channels"
-            )
-        value = tokens.numbers(size, "values")
-        offset, number = end, number + len(lines) - 1
-    else:
-        raise MeasurementError(f"{where}: DATA is {mode[:30]!r}; expected ascii or binary")
-    shape = [len(a) for a in angles[3::-1]]
-    clean = {k: one_line(v) for k, v in fields.items()}
-    return (
-        _Block(kind, clean, channels, angles, value.reshape(*shape, len(channels))),
-        offset,
-        number,
-    )
+    return [f"COLOR_MODEL {model}"]
 
 
-def _channels(fields: dict[str, str], where: str) -> tuple[Channel, ...]:
-    model = fields.get("COLOR_MODEL", "")
-    if model in _COLORS:
-        return tuple(map(Channel, _COLORS[model]))
-    if model != "spectrum":
-        raise MeasurementError(
-            f"{where}: COLOR_MODEL is {model[:30]!r}; expected one of "
-            f"{', '.join(_COLORS)}, spectrum"
-        )
-    wavelengths = _numbers(fields, "WAVELENGTH_LIST", where)
-    if len(wavelengths) == 0 or min(wavelengths) <= 0:
-        raise MeasurementError(f"{where}: WAVELENGTH_LIST must have wavelengths in nm")
-    return tuple(map(Channel.at, wavelengths))
-
-
-def _angles(fields: dict[str, str], key: str, where: str) -> NDArray[np.float64]:
-    """The list in radians; a zero where it is left out."""
-    found = _numbers(fields, key, where)
-    if not found and (key == "PARAM0_LIST" or key in fields):
-        raise MeasurementError(f"{where}: {key} is missing or empty")
-    return np.deg2rad(np.array(found or [0.0], dtype=np.float64))
-
-
-def _numbers(fields: dict[str, str], key: str, where: str) -> list[float]:
-    numbers: list[float] = []
-    for word in fields.get(key, "").split():
-        number = number_or_none(word)
-        if number is None or not np.isfinite(number):
-            raise MeasurementError(f"{where}: {word[:30]!r} in {key} is not a number")
-        numbers.append(number)
-    return numbers
-
-
-def _rows(block: _Block, notes: list[Note]) -> NDArray[np.float64]:
+def _rows(block: Block, notes: list[Note]) -> NDArray[np.float64]:
     """Four angles in radians and the values, without what is below the horizon."""
     grid = np.meshgrid(*block.angles[3::-1], indexing="ij")
     p3, p2, p1, p0 = (axis.ravel() for axis in grid)

@@ -52,7 +52,9 @@ def test_formats_are_listed():
         "astm",
         "csv",
         "hdf5",
+        "mbsdf",
         "merl",
+        "ssdd",
     }
     assert all(info.description.endswith(".") for info in infos.values())
 

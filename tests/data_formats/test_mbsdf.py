@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import made_up_optics as optics
@@ -89,6 +90,42 @@ def test_cut_short(read):
         read(b"NVIDIA ARC MBSDF V1\n")
 
 
+@pytest.mark.parametrize("suffix", [".mbsdf", ".mbsdf.gz"])
+@pytest.mark.parametrize("parts", [("REFLECTION",), ("REFLECTION", "TRANSMISSION")])
+@pytest.mark.parametrize("k", [1, 3])
+def test_what_is_written_is_what_was_read(read, tmp_path, parts, k, suffix):
+    content = optics.mbsdf(parts, (5, 4), k)
+    m = read(content)
+    path = tmp_path / f"again{suffix}"
+    data_formats.write(m, path)
+    assert data_formats.read(path).equals(m)
+    packed = path.read_bytes()
+    assert packed.startswith(b"\x1f\x8b") == suffix.endswith(".gz")
+    # But for the metadata, the same bytes.
+    assert suffix.endswith(".gz") or packed == content.replace(b'name="made up"\n', b"")
+
+
+def test_what_cannot_be_written(read, tmp_path, write_astm, ramped_rows):
+    m = read(optics.mbsdf(("REFLECTION",), (5, 4), 1))
+    path = tmp_path / "again.mbsdf"
+    masked = m.valid.copy()
+    masked[7] = False
+    with pytest.raises(MeasurementError, match="MBSDF has no masks"):
+        data_formats.write(replace(m, valid=masked), path)
+    with pytest.raises(
+        MeasurementError, match="99 rows would leave holes in a grid of 5 x 1"
+    ):
+        data_formats.write(m.select(np.arange(100) != 50), path)
+    with pytest.raises(MeasurementError, match="the reflection has other angles"):
+        data_formats.write(m.select(m.theta_i < 1), path)
+    leds = data_formats.read(
+        write_astm(ramped_rows, "theta_i,phi_i,theta_s,465nm,525nm,630nm")
+    )
+    with pytest.raises(MeasurementError, match="the channels are 465 nm, 525 nm, 630 nm"):
+        data_formats.write(leds, path)
+    assert not path.exists()
+
+
 @pytest.mark.parametrize(
     ("name", "channels", "last"),
     [
@@ -124,7 +161,7 @@ def test_fixtures_that_are_refused(real_data: Path, name, message):
     assert "\n" not in str(caught.value)
 
 
-def test_car_paint(real_data: Path):
+def test_car_paint(real_data: Path, tmp_path):
     m = data_formats.read(real_data / "mbsdf/carpaint_blue.mbsdf")
     assert (m.n_rows, m.n_channels) == (45 * 45 * 90, 3)
     # 11 of 45 incidences and 4 of 45 other angles are copies of those before.
@@ -137,5 +174,9 @@ def test_car_paint(real_data: Path):
         top = rows[np.argmax(m.value[rows, 1])]
         assert np.rad2deg(m.phi_r[top] - m.phi_i[top]) == pytest.approx(179)
         assert np.rad2deg(m.theta_r[top] - incidence) == pytest.approx(2)
+    data_formats.write(m, tmp_path / "again.mbsdf")
+    assert data_formats.read(tmp_path / "again.mbsdf").equals(m)
+    original = (real_data / "mbsdf/carpaint_blue.mbsdf").read_bytes()
+    assert (tmp_path / "again.mbsdf").read_bytes() == original + b"\n"
     # It is blue.
     assert (np.median(m.value[m.valid.all(axis=1)], axis=0).argmax()) == 2

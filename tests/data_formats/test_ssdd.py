@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import made_up_optics as optics
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 import data_formats
-from data_formats import Measurement, MeasurementError
+from data_formats import Channel, Measurement, MeasurementError
 
 HEAD = optics.SSDD_HEAD
 
@@ -149,3 +152,81 @@ def test_cut_short_and_repeated(read):
         read(content + optics.ssdd())
     with pytest.raises(MeasurementError, match=r"found 'x' among 144 values"):
         read(HEAD + optics.ssdd().rstrip().rpartition(b"\t")[0] + b"\tx\n")
+
+
+@pytest.mark.parametrize("parts", [("brdf",), ("brdf", "btdf")])
+def test_what_is_written_is_what_was_read(read, tmp_path, parts):
+    m = read(HEAD + b"".join(optics.ssdd(kind=kind, binary=True) for kind in parts))
+    data_formats.write(m, tmp_path / "again.ssdd")
+    again = data_formats.read(tmp_path / "again.ssdd")
+    assert again.equals(m)
+    assert again.provenance.sample == "made up"
+    # The list of azimuths closes the circle, for programs that interpolate.
+    assert "PARAM3_LIST 0 45 90 135 180 225 270 315 360\n" in (
+        (tmp_path / "again.ssdd").read_text()
+    )
+
+
+def axis(most: int, least: int = 0):
+    return st.lists(st.integers(least, most), min_size=1, max_size=3, unique=True)
+
+
+@settings(
+    max_examples=60,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    axes=st.tuples(axis(89), axis(359), axis(89, 1), axis(359)),
+    channels=st.sampled_from([["mono"], ["R", "G", "B"], ["X", "Y", "Z"], [400, 512.5]]),
+    turned=st.booleans(),
+    behind=st.booleans(),
+    seed=st.integers(0, 999),
+)
+def test_round_trip_of_grids(axes, channels, turned, behind, seed, tmp_path):
+    grid = np.meshgrid(*([a, [0]][k == 1 and not turned] for k, a in enumerate(axes)))
+    theta_i, phi_i, theta_r, phi_r = (np.deg2rad(a.ravel().astype(float)) for a in grid)
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(theta_i))
+    value = rng.normal(size=(len(theta_i), len(channels)))
+    m = Measurement(
+        theta_i=theta_i[order],
+        phi_i=phi_i[order],
+        theta_r=np.pi - theta_r[order] if behind else theta_r[order],
+        phi_r=phi_r[order],
+        value=value,
+        valid=np.ones(value.shape, bool),
+        channels=[Channel(c) if isinstance(c, str) else Channel.at(c) for c in channels],
+        symmetry="anisotropic" if turned else "isotropic",
+    )
+    path = tmp_path / "again.ssdd"
+    data_formats.write(m, path)
+    again = data_formats.read(path)
+    assert again.channels == m.channels
+    keys = []
+    for found in (m, again):
+        angles = np.rad2deg([found.theta_i, found.phi_i, found.theta_r, found.phi_r])
+        rows = zip(*np.round(angles).tolist(), found.value.tolist(), strict=True)
+        keys.append({tuple(row[:4]): row[4] for row in rows})
+    assert keys[0] == keys[1]
+    assert again.n_rows == m.n_rows
+    np.testing.assert_allclose(np.unique(again.theta_r), np.unique(m.theta_r), atol=1e-9)
+
+
+def test_what_cannot_be_written(read, tmp_path):
+    m = read(HEAD + optics.ssdd())
+    path = tmp_path / "again.ssdd"
+    with pytest.raises(MeasurementError, match="1 of 72 pairs of directions have no"):
+        data_formats.write(m.select(np.arange(m.n_rows) != 5), path)
+    half = m.valid.copy()
+    half[3, 0] = False
+    with pytest.raises(MeasurementError, match="1 rows are in some only"):
+        data_formats.write(replace(m, valid=half), path)
+    with pytest.raises(MeasurementError, match="the channels are a, b"):
+        data_formats.write(replace(m, channels=(Channel("a"), Channel("b"))), path)
+    with pytest.raises(MeasurementError, match="51 rows are lit from the back"):
+        data_formats.write(replace(m, theta_i=np.pi - m.theta_i), path)
+    twice = replace(m, theta_i=np.where(m.theta_i > 1, m.theta_i.max(), m.theta_i.min()))
+    with pytest.raises(MeasurementError, match="repeat the directions of others"):
+        data_formats.write(twice, path)
+    assert not path.exists()
