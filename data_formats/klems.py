@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from data_formats.measurement import MeasurementError
 from data_formats.patches import Patches
 from data_formats.plain_xml import Element
+from data_formats.provenance import one_line
 
 Array = NDArray[np.float64]
 
@@ -76,7 +77,7 @@ def basis(element: Element, where: str) -> Basis:
             low, high = float(texts[0]), float(texts[1])
             n_phi, theta = int(texts[2]), float(texts[3] or "nan")
         except ValueError:
-            found = ", ".join(t[:20] or "nothing" for t in texts[:3])
+            found = ", ".join(one_line(t[:20]) or "nothing" for t in texts[:3])
             raise MeasurementError(
                 f"{where}, line {block.line}: LowerTheta, UpperTheta and nPhis are "
                 f"{found}; expected two angles in degrees and a count"

@@ -95,8 +95,8 @@ def read(
     or not usable; `TypeError` if the format does not have an option.
     """
     name = os.fspath(path)
-    source = load(path)
-    module = _named(format) if format is not None else _recognise(source)
+    # Not kept: the format loads it again, and a file may have hundreds of megabytes.
+    module = _named(format) if format is not None else _recognise(load(path))
     try:
         # Absurd numbers are for the readers to refuse, not for numpy to warn about.
         with np.errstate(all="ignore"):

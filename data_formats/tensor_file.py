@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data_formats.measurement import MeasurementError
+from data_formats.provenance import one_line
 from data_formats.source import Source
 
 MAGIC = b"tensor_file\0"
@@ -84,7 +85,7 @@ def array(source: Source, table: Mapping[str, Field], name: str) -> NDArray[Any]
     **Raises:** `MeasurementError` if the field is absent, or reaches beyond the file.
     """
     if name not in table:
-        listed = ", ".join(sorted(table))[:200] or "none"
+        listed = one_line(", ".join(sorted(table))[:200]) or "none"
         raise MeasurementError(
             f"{source.path}: there is no field {name!r} in the file; found {listed}"
         )

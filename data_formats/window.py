@@ -182,7 +182,7 @@ def _block(
         )
     way, side = match[1].lower(), match[2].lower()
     data = next(element.all("ScatteringData"), element)
-    where = f"{path}, line {data.line}: {text}"
+    where = f"{path}, line {data.line}: {match[1]} {match[2]}"
     if reading.structure in _RANKS:
         tree = tensor_tree.cells(data.text, _RANKS[reading.structure], where)
         patches, value, beyond = tensor_tree.pairs(tree)
@@ -206,7 +206,7 @@ def _block(
 def _basis(reading: _Reading, element: Element, name: str) -> klems.Basis:
     text = element.at(name)
     if text not in reading.bases:
-        known = ", ".join(reading.bases)[:300]
+        known = one_line(", ".join(reading.bases)[:300])
         raise MeasurementError(
             f"{reading.source.path}, line {element.line}: {name} is {text[:60]!r}, which "
             f"the file does not define; known are {known}"

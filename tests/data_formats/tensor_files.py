@@ -12,6 +12,11 @@ _TYPES = {"u1": 1, "u2": 3, "f4": 10, "f8": 11}
 
 
 def write_tensor_file(path: Path, fields: Mapping[str, np.ndarray]) -> Path:
+    path.write_bytes(tensor_file(fields))
+    return path
+
+
+def tensor_file(fields: Mapping[str, np.ndarray]) -> bytes:
     size = 18 + sum(13 + len(name) + 8 * a.ndim for name, a in fields.items())
     head, body = b"tensor_file\0\1\0" + struct.pack("<I", len(fields)), b""
     for name, a in fields.items():
@@ -22,8 +27,7 @@ def write_tensor_file(path: Path, fields: Mapping[str, np.ndarray]) -> Path:
         head += struct.pack(f"<{a.ndim}Q", *a.shape)
         body += a.tobytes()
     assert len(head) == size
-    path.write_bytes(head + body)
-    return path
+    return head + body
 
 
 def _smooth(rng: np.random.Generator, *shape: int) -> np.ndarray:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import made_up_databases
 import made_up_optics
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ import data_formats
 from data_formats import MeasurementError
 
 ASTM = b"VARS theta_i,phi_i,theta_s,phi_s,450nm\n\n0.1,0,0.1,0,1\n"
-SUFFIXES = [".astm", ".brdf", ".csv", ".h5", ".mat", ".txt.gz", ""]
+SUFFIXES = [".astm", ".brdf", ".bsdf", ".csv", ".h5", ".mat", ".xml", ".txt.gz", ""]
 
 fuzzing = settings(
     deadline=None,
@@ -98,6 +99,10 @@ def test_unreadable_file(tmp_path, monkeypatch):
         b"VARS theta_i,phi_i,theta_s,phi_s,450nm,450nm\n0,0,0,0,1,1\n",
         b"theta_i,theta_r,dphi,R\n" + b"\0",
         b"31 " + b"400 " * 31,
+        b"tensor_file\0\1\0" + bytes(100),
+        b"Z\0\0\0Z\0\0\0\xb4\0\0\0" + bytes(100),
+        b"<?xml version='1.0'?><WindowElement/>",
+        b"#DIM 1 1\n#PARAM_IN COS_TH\n",
         "VARS θ,φ\n1,2\n".encode(),
     ],
 )
@@ -287,7 +292,7 @@ def sound_files(tmp_path, write_astm, shadowed_rows, ramped_rows) -> list[Path]:
         path = folder / f"version_{version}_{packed}.mat"
         savemat(path, table, format=version, do_compression=packed)
         files.append(path)
-    for name, content in made_up_optics.SOUND.items():
+    for name, content in (made_up_optics.SOUND | made_up_databases.SOUND).items():
         (folder / name).write_bytes(content)
         files.append(folder / name)
     return [*files, folder / "stream.brdf"]
@@ -323,5 +328,6 @@ def test_many_mutated_files(sound_files, tmp_path, seed):
 @pytest.mark.slow
 def test_mutated_real_files(real_data, tmp_path):
     folders = ("cornell", "minidiff", "pbrt", "csv", "zemax", "fred", "speos", "mbsdf")
+    folders += ("alta", "kaist", "radiance")
     files = [sorted((real_data / folder).iterdir())[-1] for folder in folders]
     mutate_and_read(files, tmp_path, seconds=60, seed=0)

@@ -82,7 +82,7 @@ def test_another_size_is_refused(size, file):
 
 
 def test_text_is_not_taken_for_numbers(tmp_path):
-    path = tmp_path / "x.dat"
+    path = tmp_path / "x.foo"
     path.write_bytes(b"0.25 0.5 1.5\n" * 9000)
     with pytest.raises(MeasurementError, match="not recognised"):
         data_formats.read(path)
