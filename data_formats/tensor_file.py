@@ -112,7 +112,8 @@ def nodes(source: Source, table: Mapping[str, Field], name: str, size: int) -> N
     if numbers.size != size:
         raise MeasurementError(
             f"{source.path}: field {name!r} has the shape {numbers.shape}; expected the "
-            f"{size} nodes of an axis, without which the directions are unknown"
+            f"{size} nodes of an axis, without which the directions are unknown; look for "
+            "a complete copy"
         )
     numbers = numbers.ravel().astype(np.float64)
     if not (np.isfinite(numbers).all() and (np.diff(numbers) > 0).all()):
