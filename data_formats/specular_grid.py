@@ -37,6 +37,26 @@ def around_specular(
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
+def from_specular(
+    theta_s: NDArray[np.float64], theta: NDArray[np.float64], phi: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The inverse of `around_specular`.
+
+    **Arguments:**
+
+    - `theta_s`: (n,) of the specular direction, rad.
+    - `theta`, `phi`: (n,) of the direction, rad; the source is at azimuth 0.
+
+    **Returns:** the angle to the specular direction in [0, pi], and the azimuth; (n,) rad.
+    """
+    x, y, z = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)
+    x, z = (
+        x * np.cos(theta_s) + z * np.sin(theta_s),
+        z * np.cos(theta_s) - x * np.sin(theta_s),
+    )
+    return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
+
+
 def above_horizon(theta: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(n,) whether a direction is above the horizon by more than rounding."""
     return np.cos(theta) > _HORIZON

@@ -17,7 +17,7 @@ The values follow, those of a channel side by side and PARAM0 running fastest. W
 the azimuth around it, and PARAM4 is added to the theta of that direction; with
 `half_difference_coordinate_system` the four are theta and phi of the half vector and of the
 difference. A btdf is mirrored at the surface. Source: "Surface scattering distribution data
-file format", version 0.3, K. Ryo, libbsdf.
+file format", version 0.2, R. Kimura, libbsdf.
 """
 
 from __future__ import annotations

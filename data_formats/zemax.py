@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from data_formats.measurement import Channel, Measurement, MeasurementError, Provenance
 from data_formats.provenance import Note, one_line
-from data_formats.source import load
+from data_formats.source import load, write_text
 from data_formats.specular_grid import (
     above_horizon,
     around_specular,
@@ -44,6 +44,7 @@ from data_formats.specular_grid import (
     masked_zeros,
     zeros_at_the_edge,
 )
+from data_formats.specular_table import around_the_mirror
 from data_formats.table import Table, to_measurement
 from data_formats.token_stream import Tokens
 
@@ -144,6 +145,51 @@ def read(path: str | os.PathLike[str]) -> Measurement:
         ),
         quantity="bsdf",
     )
+
+
+def write(measurement: Measurement, path: str | os.PathLike[str]) -> None:
+    """Write a Zemax tabular BSDF, if the directions are a grid around the specular one.
+
+    Angles are rounded to 1e-9 degrees; masked values at the edge of the grid become zero,
+    which is how they are read. TIS is the integral by the trapezoidal rule.
+
+    **Raises:** `MeasurementError` if the directions are no such grid, light is both
+    reflected and transmitted or from the back, or the channels are not one, or X Y Z.
+    """
+    m = measurement
+    names = tuple(c.name for c in m.channels)
+    kind = "xyz" if names == ("X", "Y", "Z") else "monochrome"
+    if len(names) != len(_BLOCKS[kind]):
+        raise MeasurementError(
+            f"Zemax holds one channel, or X Y Z; the channels are {', '.join(names)[:100]}"
+        )
+    btdf = bool(m.transmitted.any())
+    if m.from_back.any() or not (m.transmitted == btdf).all():
+        raise MeasurementError(
+            "Zemax holds reflected light alone or transmitted light alone, lit from the "
+            "front; write csv"
+        )
+    table = around_the_mirror(m, "Zemax")
+    plane = bool(table.azimuth[-1] <= 180)
+    lists = (table.rotation, table.incidence, table.azimuth, table.radial)
+    around = "Asymmetrical4D" if len(table.rotation) > 1 else "Asymmetrical"
+    lines = [
+        "Source  Measured",
+        f"Symmetry  {'PlaneSymmetrical' if plane else around}",
+        f"SpectralContent  {'XYZ' if kind == 'xyz' else 'Monochrome'}",
+        f"ScatterType  {'BTDF' if btdf else 'BRDF'}",
+    ]
+    keys = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
+    for key, angles in zip(keys, lists, strict=True):
+        lines += [f"{key}  {len(angles)}", "\t".join(f"{x:.12g}" for x in angles)]
+    for k, (keyword, _) in enumerate(_BLOCKS[kind]):
+        lines += ["", keyword, "DataBegin"]
+        blocks = table.value[..., k].reshape(-1, len(table.azimuth), len(table.radial))
+        totals = table.integral[..., k].ravel()
+        for block, total in zip(blocks.tolist(), totals.tolist(), strict=True):
+            lines += [f"TIS {total:.6g}", *("\t".join(map(repr, row)) for row in block)]
+        lines.append("DataEnd")
+    write_text(path, "\n".join([*lines, ""]))
 
 
 def _header(tokens: Tokens) -> tuple[dict[str, str], dict[str, NDArray[np.float64]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import made_up_optics as optics
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import data_formats
-from data_formats import Measurement, MeasurementError
+from data_formats import Channel, Measurement, MeasurementError
 
 
 @pytest.fixture
@@ -133,6 +134,60 @@ def test_cut_short(read):
         read(optics.zemax()[:-200])
 
 
+def same(again: Measurement, m: Measurement) -> None:
+    """Values and masks to the last bit, angles to the rounding of the file."""
+    assert (again.symmetry, again.channels) == (m.symmetry, m.channels)
+    np.testing.assert_array_equal(again.value, m.value)
+    np.testing.assert_array_equal(again.valid, m.valid)
+    for angle in ("theta_i", "phi_i", "theta_r", "phi_r"):
+        np.testing.assert_allclose(getattr(again, angle), getattr(m, angle), atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        *[("BRDF",), ("BTDF",), ("BRDF", "ASymmetrical")],
+        ("BTDF", "Asymmetrical", "XYZ"),
+    ],
+)
+def test_what_is_written_is_what_was_read(read, tmp_path, options):
+    m = read(optics.zemax(*options))
+    data_formats.write(m, tmp_path / "again.bsdf")
+    same(data_formats.read(tmp_path / "again.bsdf"), m)
+
+
+def test_the_written_integral(read, tmp_path):
+    """Of a matt surface it is the albedo; mirrored or not, it is the same."""
+    found = []
+    for symmetry in ("PlaneSymmetrical", "ASymmetrical"):
+        m = read(optics.zemax(symmetry=symmetry))
+        m = replace(m, value=np.full(m.value.shape, 0.4 / np.pi))
+        data_formats.write(m, tmp_path / "again.bsdf")
+        header = data_formats.read(tmp_path / "again.bsdf").provenance.header
+        found.append([float(x) for x in header["tis"].split()])
+    assert found[0] == pytest.approx(found[1], rel=1e-5)
+    # The made-up grid has steps of 40 degrees.
+    assert found[0] == pytest.approx([0.4] * 3, rel=0.2)
+
+
+def test_what_cannot_be_written(read, tmp_path, write_astm, ramped_rows):
+    m = read(optics.zemax())
+    path = tmp_path / "again.bsdf"
+    rgb = read(optics.zemax(content="XYZ"))
+    rgb = replace(rgb, channels=tuple(map(Channel, "RGB")))
+    inside = np.abs(np.rad2deg(m.theta_r) - 10) < 1e-6
+    with pytest.raises(MeasurementError, match="that is wrong for 7 values"):
+        data_formats.write(replace(m, valid=m.valid & ~inside[:, None]), path)
+    with pytest.raises(MeasurementError, match="the channels are R"):
+        data_formats.write(rgb, path)
+    with pytest.raises(MeasurementError, match="reflected light alone"):
+        data_formats.write(replace(m, theta_i=np.pi - m.theta_i), path)
+    leds = data_formats.read(write_astm(ramped_rows[:, :5], "theta_i,phi_i,theta_s,Y"))
+    with pytest.raises(MeasurementError, match="grids around the specular direction"):
+        data_formats.write(leds, path)
+    assert not path.exists()
+
+
 REAL = {
     "AnoBlackEC1onAlum": ([10, 30, 50, 70], 706, 134, 59),
     "aeroglaze": ([10, 30, 50, 70], 716, 568, 72),
@@ -141,7 +196,7 @@ REAL = {
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_real_files(real_data: Path, name):
+def test_real_files(real_data: Path, tmp_path, name):
     incidences, n_rows, below, masked = REAL[name]
     m = data_formats.read(real_data / f"zemax/{name}.bsdf")
     assert np.unique(np.rad2deg(m.theta_i).round(9)).tolist() == incidences
@@ -149,6 +204,8 @@ def test_real_files(real_data: Path, name):
     assert codes(m)["below-horizon-left-out"] == below
     assert codes(m)["edge-zeros-masked"] == masked
     assert (m.value[m.valid] > 0).all()
+    data_formats.write(m, tmp_path / "again.bsdf")
+    same(data_formats.read(tmp_path / "again.bsdf"), m)
     # Brightest in the plane of incidence, on the specular side.
     for incidence in np.unique(m.theta_i[m.theta_i > np.deg2rad(22)]):
         rows = np.flatnonzero((m.theta_i == incidence) & m.valid[:, 0])
