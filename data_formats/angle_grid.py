@@ -31,6 +31,12 @@ class AngleGrid:
     value: NDArray[np.float64]
 
 
+def rounded_degrees(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """An angle in degrees from 0 to below 360, without what conversions leave."""
+    degrees = np.round(np.mod(np.rad2deg(angle), 360), _DIGITS)
+    return np.asarray(degrees % 360, dtype=np.float64)
+
+
 def on_grid(measurement: Measurement, format_name: str) -> AngleGrid:
     """The values of reflected light alone, or of transmitted light alone, on a grid.
 
@@ -53,9 +59,7 @@ def on_grid(measurement: Measurement, format_name: str) -> AngleGrid:
     turned = m.phi_i if m.symmetry != "anisotropic" else np.zeros(m.n_rows)
     theta_r = np.where(m.transmitted, np.pi - m.theta_r, m.theta_r)
     columns = [m.theta_i, m.phi_i - turned, theta_r, m.phi_r - turned]
-    degrees = [np.round(np.rad2deg(a), _DIGITS) for a in columns]
-    for k in (1, 3):
-        degrees[k] = np.round(np.mod(degrees[k], 360), _DIGITS) % 360
+    degrees = [rounded_degrees(a) for a in columns]
     pole = degrees[2] == 0
     axes = [np.unique(a) for a in degrees]
     if not pole.all():

@@ -100,6 +100,8 @@ def write(measurement: Measurement, path: str | os.PathLike[str]) -> None:
             continue
         some = m.select(rows)
         grid = on_grid(some, "MBSDF")
+        if np.abs(grid.value).max() > np.finfo(np.float32).max:
+            raise MeasurementError("MBSDF holds float32; some values are beyond 3.4e38")
         table = grid.value[:, 0].astype("<f4")
         n_theta, _, n_phi, n_channels = table.shape
         centres = (np.arange(n_theta) + 0.5) * 90 / n_theta

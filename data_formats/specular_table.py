@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from data_formats.angle_grid import rounded_degrees
 from data_formats.measurement import Measurement, MeasurementError
 from data_formats.specular_grid import (
     above_horizon,
@@ -15,8 +16,6 @@ from data_formats.specular_grid import (
     zeros_at_the_edge,
 )
 
-# Of a degree: what conversions between units leave.
-_DIGITS = 9
 # More cells per row than this are no grid that was measured.
 _MOST_CELLS = 20
 
@@ -58,9 +57,9 @@ def around_the_mirror(measurement: Measurement, format_name: str) -> SpecularTab
     radial, azimuth = from_specular(m.theta_i, theta, m.phi_r - m.phi_i)
     rotation = m.phi_i if m.symmetry == "anisotropic" else np.zeros(m.n_rows)
     columns: list[NDArray[np.float64]] = [rotation, m.theta_i, azimuth, radial]
-    degrees = [np.asarray(np.round(np.degrees(a), _DIGITS), np.float64) for a in columns]
+    degrees = [rounded_degrees(a) for a in columns]
     pole = degrees[3] == 0
-    degrees[2] = np.where(pole, 0.0, np.round(np.mod(degrees[2], 360), _DIGITS) % 360)
+    degrees[2] = np.where(pole, 0.0, degrees[2])
     axes: list[NDArray[np.float64]] = [np.unique(a) for a in degrees]
     if not pole.all():
         axes[2] = np.unique(degrees[2][~pole])
@@ -99,14 +98,13 @@ def around_the_mirror(measurement: Measurement, format_name: str) -> SpecularTab
         np.trapezoid(value * weight[..., None], np.deg2rad(axes[3]), axis=3),
         dtype=np.float64,
     )
-    whole = 2.0
+    circle, whole = np.deg2rad(axes[2]), 2.0
     if axes[2][-1] > 180:
-        # The circle is closed, for programs that interpolate.
-        axes[2] = np.append(axes[2], axes[2][0] + 360)
-        value = np.concatenate([value, value[:, :, :1]], axis=2)
+        circle, whole = np.append(circle, circle[0] + 2 * np.pi), 1.0
         rings = np.concatenate([rings, rings[:, :, :1]], axis=2)
-        whole = 1.0
-    integral = np.asarray(
-        np.trapezoid(rings, np.deg2rad(axes[2]), axis=2), dtype=np.float64
-    )
+        if axes[2][0] == 0:
+            # The circle is closed, for programs that interpolate.
+            axes[2] = np.append(axes[2], 360.0)
+            value = np.concatenate([value, value[:, :, :1]], axis=2)
+    integral = np.asarray(np.trapezoid(rings, circle, axis=2), dtype=np.float64)
     return SpecularTable(axes[0], axes[1], axes[2], axes[3], value, whole * integral)

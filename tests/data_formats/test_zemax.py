@@ -139,8 +139,12 @@ def same(again: Measurement, m: Measurement) -> None:
     assert (again.symmetry, again.channels) == (m.symmetry, m.channels)
     np.testing.assert_array_equal(again.value, m.value)
     np.testing.assert_array_equal(again.valid, m.valid)
-    for angle in ("theta_i", "phi_i", "theta_r", "phi_r"):
-        np.testing.assert_allclose(getattr(again, angle), getattr(m, angle), atol=1e-10)
+    for theta, phi in (("theta_i", "phi_i"), ("theta_r", "phi_r")):
+        vectors = [
+            optics.unit(np.rad2deg(getattr(x, theta)), np.rad2deg(getattr(x, phi)))
+            for x in (again, m)
+        ]
+        np.testing.assert_allclose(vectors[0], vectors[1], atol=1e-10)
 
 
 @pytest.mark.parametrize(
@@ -154,6 +158,17 @@ def test_what_is_written_is_what_was_read(read, tmp_path, options):
     m = read(optics.zemax(*options))
     data_formats.write(m, tmp_path / "again.bsdf")
     same(data_formats.read(tmp_path / "again.bsdf"), m)
+
+
+def test_azimuths_that_do_not_begin_at_zero(read, tmp_path):
+    m = read(optics.zemax(symmetry="ASymmetrical"))
+    pole = np.isclose(m.theta_r, m.theta_i) & np.isclose(np.cos(m.phi_r - m.phi_i), -1)
+    pole |= (m.theta_r == 0) & (m.theta_i == 0)
+    half = m.select(pole | (np.sin(m.theta_r) * np.sin(m.phi_r) < -1e-9))
+    data_formats.write(half, tmp_path / "again.bsdf")
+    again = data_formats.read(tmp_path / "again.bsdf")
+    assert again.provenance.header["scatterazimuth"] == "210 240 270 300 330"
+    same(again, replace(half, symmetry="bilateral"))
 
 
 def test_the_written_integral(read, tmp_path):
