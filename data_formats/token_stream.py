@@ -31,7 +31,9 @@ class Tokens:
     position: int = 0
 
     @staticmethod
-    def of(path: str, lines: Sequence[str], first_line: int = 1, comment: str = "#"):
+    def of(
+        path: str, lines: Sequence[str], first_line: int = 1, *, comment: str = "#"
+    ) -> Tokens:
         """The words of lines; what follows `comment` in a line is left out."""
         words: list[str] = []
         numbers: list[int] = []
