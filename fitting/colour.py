@@ -11,8 +11,8 @@ from fitting.colorimetry import (
     delta_e_2000,
     tristimulus_weights,
 )
-from fitting.problem import Rows
 from fitting.result import Colour
+from fitting.rows import Rows
 
 _STEP_NM = 5.0
 

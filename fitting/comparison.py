@@ -16,8 +16,8 @@ from fitting.model import Model
 from fitting.models import lobe_names
 from fitting.models.lobe import THROUGH
 from fitting.options import FitOptions
-from fitting.problem import ways_of
 from fitting.result import FitResult
+from fitting.rows import ways_of
 
 # What is tried when the user names no model: diffuse plus one lobe with long skirts, with
 # short ones, or without the 1/(cos cos) of a facet on air (flakes below a clear coat); and

@@ -6,8 +6,8 @@ import math
 
 from data_formats import Measurement
 from fitting import diagnostics
-from fitting.problem import Rows
 from fitting.result import Data, DataAlbedo, DataNote, DataReciprocity
+from fitting.rows import Rows
 
 
 def data_record(m: Measurement, rows: Rows, index: float) -> Data:

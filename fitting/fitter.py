@@ -20,7 +20,6 @@ from fitting.expression import ModelError
 from fitting.given import with_given
 from fitting.model import Model
 from fitting.options import FitOptions
-from fitting.problem import Rows, select_rows, with_noise_of
 from fitting.result import (
     SCHEMA_VERSION,
     Channel,
@@ -30,6 +29,7 @@ from fitting.result import (
     Settings,
     Solver,
 )
+from fitting.rows import Rows, select_rows, with_noise_of
 from fitting.search import again, predicted_by, robust_width, search
 from fitting.summary import Found, joined_values
 from fitting.uncertainty import covariance

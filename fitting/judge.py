@@ -6,8 +6,9 @@ import numpy as np
 
 from fitting.objectives import transform
 from fitting.options import FitOptions
-from fitting.problem import Rows, residual_terms
+from fitting.problem import residual_terms
 from fitting.result import AngleError, ChannelError, Scores
+from fitting.rows import Rows
 from fitting.solid_angle import incidence_labels
 
 _MAX_FOLDS = 10

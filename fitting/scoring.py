@@ -12,8 +12,8 @@ from fitting import judge
 from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions
-from fitting.problem import select_rows, with_noise_of
 from fitting.result import AngleError, ChannelError, FitResult, Scores, Settings
+from fitting.rows import select_rows, with_noise_of
 
 
 class Score(msgspec.Struct, frozen=True):

@@ -16,8 +16,9 @@ from fitting import judge, starts
 from fitting.model import Model
 from fitting.options import FitOptions
 from fitting.predict import predict_geometry
-from fitting.problem import Rows, for_channel, prepare
+from fitting.problem import for_channel, prepare
 from fitting.reduced import Problem
+from fitting.rows import Rows
 from fitting.solve import Solution, refine
 from fitting.summary import Found, joined_values
 

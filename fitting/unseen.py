@@ -9,7 +9,7 @@ import numpy as np
 from fitting.model import Model
 from fitting.options import FitOptions
 from fitting.predict import predict_geometry
-from fitting.problem import Rows
+from fitting.rows import Rows
 from fitting.unknowns import make_unknowns
 
 

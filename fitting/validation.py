@@ -12,8 +12,8 @@ import numpy as np
 from fitting import judge
 from fitting.model import Model
 from fitting.options import FitOptions
-from fitting.problem import Rows
 from fitting.result import AngleError, CrossValidation
+from fitting.rows import Rows
 from fitting.search import predicted_by, problems
 from fitting.solve import refine
 from fitting.summary import Found

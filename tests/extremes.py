@@ -14,8 +14,8 @@ from fitting.geometry import from_angles
 from fitting.model import Model
 from fitting.models import lobe_class
 from fitting.predict import predict_geometry
-from fitting.problem import select_rows
 from fitting.result import FitResult
+from fitting.rows import select_rows
 
 WIDTHS = (1e-3, 1e-2, 0.1, 0.5, 1.0, 1.5)
 OFFSETS = np.array([1e-3 * k for k in (0, 0.3, 1, 3, 10, 30, 100)])

@@ -19,7 +19,7 @@ from fitting.albedo import model_albedo
 from fitting.model import Model
 from fitting.models import LOBES, Lobe
 from fitting.parameters import coefficient, shape
-from fitting.problem import select_rows
+from fitting.rows import select_rows
 from fitting.solid_angle import incidence_labels, solid_angle_weights, solid_angles
 
 

@@ -16,7 +16,7 @@ from fitting.model import Model
 
 def prepared(expression, truth, angles):
     m = synthetic.measurement(expression, truth, angles=angles)
-    return problem.prepare(problem.select_rows(m, 85.0), Model(expression), FitOptions())
+    return problem.prepare(select_rows(m, 85.0), Model(expression), FitOptions())
 
 
 def said(expression, angles, **shape):

@@ -33,7 +33,7 @@ def noisy():
 
 
 def prepared(measurement, expression="lambert + ggx", **kwargs):
-    rows = problem.select_rows(measurement, 85.0)
+    rows = select_rows(measurement, 85.0)
     return problem.prepare(rows, Model(expression), FitOptions(**kwargs))
 
 
@@ -172,7 +172,7 @@ def test_chunks_and_padding_change_nothing(noisy):
             whole, reduced.evaluate(parts, u, x, jnp.asarray(False)), strict=True
         ):
             np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-15)
-        n = problem.select_rows(noisy, 85.0).index.size
+        n = select_rows(noisy, 85.0).index.size
         assert p.kappa.shape[0] == problem.bucket(n) > n
 
 

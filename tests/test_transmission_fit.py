@@ -15,8 +15,8 @@ from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions
 from fitting.predict import predict
-from fitting.problem import select_rows, ways_of
 from fitting.refractive_index import refractive_index
+from fitting.rows import select_rows, ways_of
 from fitting.scoring import score
 from fitting.solid_angle import solid_angle_weights
 from fitting.unknowns import make_unknowns

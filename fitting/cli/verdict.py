@@ -10,9 +10,9 @@ import numpy as np
 
 from data_formats import Measurement
 from fitting.model import Model
-from fitting.problem import select_rows
 from fitting.quantities import degrees, percent
 from fitting.result import FitResult
+from fitting.rows import select_rows
 
 Level = Literal["good", "fair", "poor"]
 

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 
 _KEY = "benchmark"
+
+
+@pytest.fixture(autouse=True)
+def nothing_from_a_cache() -> Iterator[None]:
+    """What is timed and analysed is what the compiler makes now."""
+    import jax
+
+    jax.config.update("jax_enable_compilation_cache", False)
+    yield
+    jax.config.update("jax_enable_compilation_cache", True)
 
 
 @pytest.fixture

@@ -18,8 +18,9 @@ import pytest
 import synthetic
 
 from fitting import FitOptions, Model
-from fitting.problem import prepare, select_rows
+from fitting.problem import prepare
 from fitting.reduced import evaluate
+from fitting.rows import select_rows
 
 pytestmark = pytest.mark.slow
 

@@ -26,8 +26,9 @@ from scipy.optimize import least_squares
 
 from data_formats import Measurement
 from fitting import FitOptions, Model, fit, read
-from fitting.problem import Rows, prepare, select_rows
+from fitting.problem import prepare
 from fitting.reduced import Problem
+from fitting.rows import Rows, select_rows
 from fitting.solve import Solution, refine
 from fitting.starts import best_starts
 
