@@ -12,6 +12,7 @@ import synthetic
 
 from fitting import FitOptions, fit, problem, sampling, starts
 from fitting.model import Model
+from fitting.rows import select_rows
 
 
 def prepared(expression, truth, angles):

@@ -16,6 +16,7 @@ from fitting import problem, reduced, solve, starts
 from fitting.model import Model
 from fitting.objectives import OBJECTIVES, transform
 from fitting.options import FitOptions
+from fitting.rows import select_rows
 
 TRUTH = {
     "lambert.albedo": np.array([0.3, 0.2, 0.1]),
