@@ -13,6 +13,10 @@ from data_formats.provenance import Note, Provenance
 
 Symmetry = Literal["isotropic", "bilateral", "anisotropic"]
 
+# The auxiliary column with the part of the hemisphere that a row stands for, sr, weighed by
+# the cosine, where the file states it.
+PROJECTED_SOLID_ANGLE = "projected_solid_angle"
+
 # rad; what conversion from degrees leaves of a direction on the horizon.
 _ON_HORIZON = 1e-9
 
@@ -74,7 +78,8 @@ class Measurement:
         measured; `"anisotropic"`: depends on both azimuths.
     - `provenance`: the file, the instrument, the sample.
     - `notes`: everything that the reader has to say.
-    - `auxiliary`: further named columns of the file, (n,) each, in the file's units.
+    - `auxiliary`: further named columns of the file, (n,) each, in the file's units;
+        `PROJECTED_SOLID_ANGLE` is known by name.
 
     **Raises:** `MeasurementError` if an array does not fit this description.
     """

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from data_formats import klems, plain_xml, tensor_tree
 from data_formats.measurement import (
+    PROJECTED_SOLID_ANGLE,
     Channel,
     Measurement,
     MeasurementError,
@@ -99,9 +100,7 @@ def read(path: str | os.PathLike[str]) -> Measurement:
         channels=tuple(channels),
         provenance=_provenance(source, layer, reading.structure),
         notes=_notes(reading, lacking, int(np.count_nonzero(~valid)) - lacking),
-        auxiliary={
-            "projected_solid_angle": np.concatenate([g.patches.area for g in groups])
-        },
+        auxiliary={PROJECTED_SOLID_ANGLE: np.concatenate([g.patches.area for g in groups])},
     )
     return describe(in_wavelength_order(m))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
@@ -240,3 +242,15 @@ def test_an_index_is_that_of_one_medium_in_another(tmp_path):
                  material={"rough_dielectric": "1.5 in 1.0"})  # fmt: skip
     assert set(result.parameter("rough_dielectric.eta").value) == {1.5}
     assert result.parameter("rough_dielectric.eta").fixed
+
+
+def test_the_solid_angle_that_a_file_states_goes_before_what_rings_tell():
+    m = measured(BOTH, FOIL, ("front", "down"), theta_i=(10.0,))
+    steep = np.minimum(m.theta_r, np.pi - m.theta_r)
+    share = np.cos(steep) * np.sin(steep)
+    own = np.pi * share / share[~m.transmitted].sum()
+    stated = replace(m, auxiliary={"projected_solid_angle": own})
+    (found,) = diagnostics.data_albedo(stated)
+    assert found.covered == pytest.approx(1.0, abs=1e-9)
+    assert found.albedo == pytest.approx(0.3 + 0.2, abs=1e-9)
+    assert found.transmitted == pytest.approx(0.2, abs=1e-9)
