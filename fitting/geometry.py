@@ -171,8 +171,8 @@ def from_components(wix, wiy, wiz, wox, woy, woz) -> Geometry:
 
 
 def _library(*arrays: Any) -> Any:
-    """numpy where all arrays are numpy's, else JAX."""
-    return np if all(isinstance(a, np.ndarray) for a in arrays) else jnp
+    """numpy where all arrays are numpy's, or its scalars, else JAX."""
+    return np if all(isinstance(a, np.ndarray | np.generic) for a in arrays) else jnp
 
 
 def _half(lib: Any, sx, sy, sz) -> tuple:

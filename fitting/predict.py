@@ -63,7 +63,7 @@ def predict_geometry(
         padded = jax.tree.map(lambda a: jnp.asarray(pad(a)), geometry)
         own = {k: jnp.asarray(v, dtype=jnp.float64) for k, v in values.items()}
         out = np.asarray(_evaluate(model, own, padded))[:n]
-    return out.reshape(*shape, *out.shape[1:])
+    return out.reshape((*shape, *out.shape[1:]))
 
 
 def _channels(values: Mapping[str, ArrayLike]) -> int:

@@ -254,3 +254,15 @@ def test_the_solid_angle_that_a_file_states_goes_before_what_rings_tell():
     assert found.covered == pytest.approx(1.0, abs=1e-9)
     assert found.albedo == pytest.approx(0.3 + 0.2, abs=1e-9)
     assert found.transmitted == pytest.approx(0.2, abs=1e-9)
+
+
+def test_one_pair_of_directions_is_evaluated_in_double_precision():
+    values = Model("rough_dielectric").defaults()
+    into = np.radians([30.0, 0.0, 155.0, 170.0])
+    there, back = (
+        predict("rough_dielectric", values, *into[order])
+        for order in ([0, 1, 2, 3], [2, 3, 0, 1])
+    )
+    assert there.shape == ()
+    assert there.dtype == np.float64
+    assert float(there / back) == pytest.approx(1.5**2, rel=1e-13)
