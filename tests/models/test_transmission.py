@@ -186,17 +186,22 @@ def test_lobes_between_other_media_do_not_make_a_reciprocal_sum(expression, reci
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
 def test_derivatives_of_the_transmitted_albedo_are_finite(precision):
     lobe = lobe_class("rough_dielectric")()
+    mu = [0.0, 0.1, 0.5, 0.8, 1.0]
 
-    def sums(alpha, eta):
-        shape = {"alpha": alpha, "eta": eta}
-        both = (
-            albedo_basis(lobe, shape, [0.0, 0.1, 0.5, 0.8, 1.0], nodes=4, way=way)[1]
-            for way in ("down", "up")
+    def sums(shape):
+        ways = ("down", "up")
+        return jnp.stack(
+            [albedo_basis(lobe, shape, mu, nodes=2, way=way)[1] for way in ways]
         )
-        return jnp.concatenate(list(both))
 
+    def both(shape):
+        return jax.jacrev(sums)(shape), jax.jacfwd(sums)(shape)
+
+    hasty = {"xla_backend_optimization_level": 0}
     with jax.enable_x64(precision is np.float64):
-        alpha, eta = jnp.asarray([0.01, 0.3], precision), jnp.asarray([1.5, 1.5], precision)
-        for derivative in (jax.jacrev, jax.jacfwd):
-            slopes = jax.vmap(derivative(sums, argnums=(0, 1)))(alpha, eta)
-            assert all(np.all(np.isfinite(s)) for s in slopes)
+        shape = {
+            "alpha": jnp.asarray([0.01, 0.3], precision),
+            "eta": jnp.asarray([1.5, 1.1], precision),
+        }
+        slopes = jax.jit(jax.vmap(both), compiler_options=hasty)(shape)
+        assert all(np.all(np.isfinite(s)) for s in jax.tree.leaves(slopes))
