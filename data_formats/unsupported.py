@@ -8,7 +8,7 @@ import re
 _KNOWN: tuple[tuple[str, re.Pattern[bytes]], ...] = tuple(
     (name, re.compile(pattern, re.MULTILINE))
     for name, pattern in (
-        ("a tensor_file container (RGL .bsdf, KAIST .pbsdf)", rb"\Atensor_file\0"),
+        ("a tensor_file container that is neither RGL's nor KAIST's", rb"\Atensor_file\0"),
         ("a Fourier BSDF (SCATFUN)", rb"\ASCATFUN"),
         ("an ALTA function file (#FUNC)", rb"^#FUNC\b"),
         ("a LightTools BSDF file (ScatterRadial)", rb"^[ \t]*ScatterRadial[ \t]+\d"),

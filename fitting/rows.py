@@ -79,7 +79,7 @@ def select_rows(
     left_out = tuple(f"{int(r.sum())} {text}" for r, text in reasons if r.any())
     if not keep.any():
         raise MeasurementError(
-            f"{m.provenance.path or 'measurement'}: no row is left to fit "
+            f"{m.provenance.path or 'measurement'}: no row is left for the model "
             f"({'; '.join(left_out) or 'it is empty'}); see `brdf info`"
         )
     top = float(np.abs(np.where(m.valid[keep], m.value[keep], 0.0)).max())

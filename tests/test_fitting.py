@@ -286,7 +286,7 @@ def test_score_without_fitting_repeats_the_scores(paint, result):
 def test_data_without_a_row_to_fit():
     transmitted = synthetic.measurement("lambert", {}, angles=synthetic.directions(rings=4))
     transmitted = dataclasses.replace(transmitted, theta_r=np.pi - transmitted.theta_r)
-    with pytest.raises(MeasurementError, match="no row is left to fit"):
+    with pytest.raises(MeasurementError, match="no row is left for the model"):
         fit(transmitted.select(transmitted.theta_r > 1.7), "lambert")
 
 

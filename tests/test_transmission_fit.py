@@ -122,7 +122,7 @@ def test_rows_are_kept_for_the_ways_that_a_model_knows():
     assert any("transmitted rows" in s and "lambert_transmission" in s
                for s in one.data.left_out)  # fmt: skip
     assert any("reflected at the back" in s for s in one.data.left_out)
-    with pytest.raises(MeasurementError, match="no row is left to fit"):
+    with pytest.raises(MeasurementError, match="no row is left for the model"):
         select_rows(m.select(m.transmitted), 85.0, Model("ggx").ways)
 
 
@@ -195,6 +195,20 @@ def test_what_no_row_sees_is_held_and_said():
     assert [w.partition(" ")[0] for w in words] == ["lambert", "ggx", "thin_slab.reflected"]
     with jax.enable_x64(True):
         assert without_unseen(rows, model, options)[1] == []
+
+
+def test_what_is_held_keeps_to_the_users_bounds_and_ties():
+    values = {"lambert.albedo": 0.4}
+    rows = select_rows(measured("lambert", values, ("front",)), 85.0, ("front",))
+    bounds = {"thin_slab.transmitted": (0.0, 0.5)}
+    with jax.enable_x64(True):
+        held, _ = without_unseen(rows, Model("thin_slab"), FitOptions(bounds=bounds))
+        assert held.fix["thin_slab.transmitted"] == 0.5
+        assert held.bounds == {}
+        make_unknowns(Model("thin_slab"), 1, held)
+        tie = {"lambert.albedo": "lambert_transmission.transmittance"}
+        free, words = without_unseen(rows, Model(BOTH), FitOptions(tie=tie))
+    assert (free.fix, words) == ({}, [])
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ _COMMANDS = {
     "info": "Say what is in a file: geometry, coverage, values, quality.",
     "score": "Measure a fit result against a file, without fitting.",
     "reflectance": "Reflectances, transmittances and colours of a fit or of a file.",
-    "convert": "Write a file of measured reflectance in another format.",
+    "convert": "Write measurements in another format.",
     "models": "List the models, or describe one in full.",
     "formats": "List the file formats, or describe one in full.",
     "stress": "Put lobes to the test: contracts, and rounding errors against 50 digits.",

@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 
 def convert(
-    source: Annotated[Path, Parameter(help="A file of measured reflectance.")],
+    source: Annotated[
+        Path,
+        Parameter(help="A file of measurements, or NAME.fit.json for values of its model."),
+    ],
     target: Annotated[Path, Parameter(help="The file to write.")],
     /,
     *,
@@ -35,7 +38,7 @@ def convert(
     reader: Reader = None,
     flags: Flags | None = None,
 ) -> int:
-    """Write a file of measured reflectance in another format."""
+    """Write measurements in another format."""
     import data_formats
     from fitting.cli import assignments, reading, terminal
 

@@ -11,7 +11,7 @@ from cyclopts import Group, Parameter
 _GROUP = Group("Output", sort_key=90)
 
 # What every command that reads a file takes.
-File = Annotated[Path, Parameter(help="A file of measured reflectance.")]
+File = Annotated[Path, Parameter(help="A file of measurements.")]
 Format = Annotated[
     str | None, Parameter(help="Format of the file, if it is not recognised.")
 ]

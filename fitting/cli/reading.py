@@ -51,10 +51,20 @@ def read_file(
 def read_files(
     paths: Sequence[Path], format: str | None, reader: Mapping[str, Any] | None = None
 ) -> Measurement:
-    """The measurement of one file, or of several files of one sample together."""
+    """The measurement of one file, or of several files of one sample together.
+
+    Raises `UsageError` for the same file twice: its rows would pass for twice the evidence.
+    """
     import data_formats
 
     found = [read_file(path, format, reader) for path in paths]
+    seen: dict[str, Path] = {}
+    for m, path in zip(found, paths, strict=True):
+        if m.provenance.sha256 in seen:
+            raise UsageError(
+                f"{seen[m.provenance.sha256]} and {path} are the same file; give each once"
+            )
+        seen[m.provenance.sha256] = path
     return found[0] if len(found) == 1 else data_formats.join(*found)
 
 

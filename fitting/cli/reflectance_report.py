@@ -66,7 +66,11 @@ def _colour_cells(colour: ObjectColour | None) -> list[str]:
 def _channels(out: Console, report: Report, everything: bool) -> None:
     if not report.quantities:
         return
-    out.print(heading("Reflectance factors by channel"))
+    through = [line.reflectance.transmitted for line in report.quantities]
+    of = "Transmittance" if all(through) else "Reflectance"
+    if any(through) and not all(through):
+        of = "Reflectance and transmittance (T)"
+    out.print(heading(f"{of} factors by channel"))
     rows = table("channel", *(line.geometry for line in report.quantities))
     names = report.quantities[0].reflectance.channels
     for c in shown_channels(len(names), everything):

@@ -79,12 +79,13 @@ def of_result(path: Path, asked: Asked, reference: Path | None, flags: Flags) ->
         for k, geometry in enumerate(chosen):
             work.at(geometry.name, k, 0)
             line = _line(surface, geometry, asked)
-            if other is not None and line.colour is not None:
+            if other is not None:
                 compared = _line(other, geometry, asked).colour
-                if compared is None:
+                if compared is None or line.colour is None:
+                    which, own = (reference, other) if line.colour else (path, surface)
                     raise UsageError(
-                        f"--reference {reference}: no colour can be made of its "
-                        f"{len(other.names)} channels"
+                        f"--reference {reference}: no colour can be made of the "
+                        f"{len(own.names)} channels of {which}"
                     )
                 line = msgspec.structs.replace(
                     line, delta_e_2000=colour_difference(line.colour, compared)
@@ -99,7 +100,10 @@ def of_file(path: Path, measurement: Measurement, asked: Asked) -> Report:
     _check_colour(asked)
     if asked.cone:
         raise UsageError("--cone: rows are too far apart for cones; fit a model first")
-    usual = (DEFAULT_THROUGH if measurement.transmitted.any() else ()) + DEFAULT
+    usual = DEFAULT_THROUGH if measurement.transmitted.any() else ()
+    usual += () if asked.transmitted else DEFAULT
+    if not (asked.geometry or usual):
+        raise UsageError(f"--transmitted: {path} has no transmitted light")
     chosen = _named(asked.geometry or usual, asked)
     at = [c.wavelength_nm for c in measurement.channels]
     names = [c.name for c in measurement.channels]

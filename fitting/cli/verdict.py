@@ -128,24 +128,28 @@ def _misfit(result: FitResult, level: Level) -> list[str]:
     if level != "poor" or not result.solver.converged:
         return []
     worst = max(result.by_angle, key=lambda a: a.objective)
-    at = worst.theta_i_deg
+    at, steep = worst.theta_i_deg, min(worst.theta_i_deg, 180.0 - worst.theta_i_deg)
     out = (
-        f"another model may do better: try {_richer(result.model)}, see `brdf models`; the "
+        f"another model may do better: try {_richer(result)}, see `brdf models`; the "
         f"error is largest at theta_i = {degrees(at)} deg"
     )
-    if at > 60:
+    if steep > 60:
         out += (
-            f", so a cut-off (--max-theta {degrees(at - 5)}) tells whether grazing light "
-            "is the reason"
+            f", so a cut-off (--max-theta {degrees(steep - 5)}) tells whether grazing "
+            "light is the reason"
         )
     return [out]
 
 
-def _richer(expression: str) -> str:
-    model = Model(expression)
+def _richer(result: FitResult) -> str:
+    """A lobe more, for light that was measured and that the model knows."""
+    model = Model(result.model)
     if len(model.labels) > 2:
         return "other lobes than these"
-    return f"-m '{Model(f'{expression} + ggx').expression}'"
+    also = "ggx" if "front" in model.ways else "ggx(back)"
+    if not {"front", "back"} & set(model.ways):
+        also = "thin_slab"
+    return f"-m '{Model(f'{result.model} + {also}').expression}'"
 
 
 def _unseen(result: FitResult) -> list[str]:

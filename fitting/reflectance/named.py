@@ -68,6 +68,11 @@ def named(
     excluded = plain.endswith(" sce")
     plain = plain.removesuffix(" sce").removesuffix(" sci")
     plain = _ALIASES.get(plain, plain)
+    if excluded and not ("d" in plain and "/" in plain):
+        raise ModelError(
+            f"geometry {name!r}: only a direction with a hemisphere (8/d, d/8) has a "
+            "specular component to exclude"
+        )
     whole = Hemispherical()
     mark = "T " if through else ""
     if plain == "white-sky":

@@ -58,6 +58,12 @@ def test_files_that_do_not_go_together_are_refused_and_nothing_is_written(run, f
     refuse(run, 3, "fit", *names, says=names)
 
 
+def test_a_file_given_twice_is_no_more_evidence(run, files):
+    Path("copy.csv").write_bytes(Path(files[0]).read_bytes())
+    for second in (files[0], "copy.csv"):
+        refuse(run, 2, "fit", files[0], second, says=["are the same file"])
+
+
 def test_info_tells_reflected_from_transmitted_light(run):
     write(measured(behind=True, sides=(0.0, 180.0)), "both.astm")
     outcome = run("info", "both.astm", "--relative-index", "1.2")

@@ -99,3 +99,16 @@ def test_what_to_try_next(good, judge):
     _, text = judge(with_reciprocity(good, 0.01), 0.3)
     assert "-m 'lambert + 2*ggx'" in text
     assert "--max-theta 60" in text
+
+
+def test_what_to_try_fits_the_light_that_was_measured(good, judge):
+    worst = change(good.by_angle[0], theta_i_deg=110.0, objective=1e3)
+    poor = with_reciprocity(change(good, by_angle=[worst]), 1e-3)
+    for model, also in (
+        ("lambert_transmission", "lambert_transmission + thin_slab"),
+        ("ggx(back)", "2*ggx(back)"),
+        ("lambert", "lambert + ggx"),
+    ):
+        _, text = judge(change(poor, model=model), 0.3)
+        assert f"-m '{also}'" in text
+        assert "--max-theta 65" in text

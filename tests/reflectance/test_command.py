@@ -99,6 +99,8 @@ def test_file(run):
     [
         (("-g", "9/x"), 2, "known: 45/0"),
         (("-g", "T 0/d"), 2, "transmits no light"),
+        (("-g", "45/0 SCE"), 2, "specular component to exclude"),
+        (("-g", "d/d SCE"), 2, "specular component to exclude"),
         (("--from", "back"), 2, "does nothing with such light"),
         (("--transmitted",), 2, "behind the sample"),
         (("-g", "8/d", "--illuminant", "D66"), 2, "illuminant"),
