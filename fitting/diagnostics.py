@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from data_formats import Measurement
-from data_formats.measurement import PROJECTED_SOLID_ANGLE
-from fitting.solid_angle import angle_labels, incidence_labels, solid_angles
+from fitting.solid_angle import angle_labels, incidence_labels, projected_solid_angles
 
 _SAME_DIRECTION = 1e-3
 _WIDEST_GAP = np.radians(20.0)
@@ -51,23 +50,12 @@ def data_albedo(m: Measurement) -> list[Albedo]:
 
 
 def _sums(m: Measurement, rows: np.ndarray) -> np.ndarray | None:
-    """Albedo of some rows, all on one side, and what they cover, ``(2, c)``.
-
-    Rows stand for the projected solid angle that the file states, in a column of that
-    name (one source direction at a time), or for what lies between them on rings.
-    """
+    """Albedo of some rows, all on one side, and what they cover, ``(2, c)``."""
     if not rows.size:
         return None
-    stated = m.auxiliary.get(PROJECTED_SOLID_ANGLE)
-    if stated is not None:
-        sources = np.unique(np.round(m.phi_i[rows], 6)).size
-        projected = stated[rows] / sources
-    else:
-        theta_r = _from_normal(m.theta_r[rows])
-        angle = solid_angles(theta_r, m.phi_r[rows] - m.phi_i[rows])
-        if angle is None:
-            return None
-        projected = angle * np.cos(theta_r)
+    projected = projected_solid_angles(m, rows)
+    if projected is None:
+        return None
     value = np.where(m.valid[rows], m.value[rows], 0.0)
     return np.stack([projected @ value, projected @ m.valid[rows] / np.pi])
 

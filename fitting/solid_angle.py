@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from data_formats import Measurement
+from data_formats.measurement import PROJECTED_SOLID_ANGLE
+
 _SAME_ANGLE = 1e-3
 _BIN = np.radians(1.0)
 _MANY = 90
@@ -32,6 +35,20 @@ def solid_angle_weights(
         own = _of_one_incidence(theta_r[rows], phi_r[rows] - phi_i[rows])
         weights[rows] = own / own.mean()
     return weights
+
+
+def projected_solid_angles(m: Measurement, rows: np.ndarray) -> np.ndarray | None:
+    """Projected solid angle in sr of some rows of one incidence, all on one side.
+
+    What the file states, in a column of that name (one source direction at a time), or
+    what lies between the rows on rings; None where neither is known.
+    """
+    stated = m.auxiliary.get(PROJECTED_SOLID_ANGLE)
+    if stated is not None:
+        return stated[rows] / np.unique(np.round(m.phi_i[rows], 6)).size
+    theta_r = np.minimum(m.theta_r[rows], np.pi - m.theta_r[rows])
+    angle = solid_angles(theta_r, m.phi_r[rows] - m.phi_i[rows])
+    return None if angle is None else angle * np.cos(theta_r)
 
 
 def solid_angles(theta_r: np.ndarray, delta: np.ndarray) -> np.ndarray | None:

@@ -8,14 +8,26 @@ from dataclasses import replace
 import numpy as np
 
 from data_formats import Measurement
+from data_formats.measurement import PROJECTED_SOLID_ANGLE
 from fitting.quantities import percent
-from fitting.reflectance.beams import Directional, Hemispherical, projected_solid_angle
+from fitting.reflectance.beams import (
+    Conical,
+    Directional,
+    Hemispherical,
+    projected_solid_angle,
+)
 from fitting.reflectance.rings import arc
 from fitting.reflectance.rows import Missing, Part, at_incidence, incidences, mixed
-from fitting.solid_angle import angle_labels, solid_angles
+from fitting.solid_angle import angle_labels, projected_solid_angles
 
 LEAST_COVERED = 0.5
-_STEPS = 64
+STATED = (
+    "the file states the projected solid angle of each row; its values count as averages "
+    "over patches that fill the hemisphere, and nothing is added for the sampling"
+)
+_STEPS = 256
+# A ring's zone and its rows' solid angles differ in second order of its width.
+_SAME_ZONE = 0.005
 
 
 def at_angle(m: Measurement, incident: Directional, region: Hemispherical) -> Part:
@@ -88,6 +100,8 @@ def _sum(m: Measurement, region: Hemispherical) -> Part:
             if full is None
             else f"at {angle:.1f} deg the rows cover {share} of it, less than half"
         )
+    if PROJECTED_SOLID_ANGLE in m.auxiliary:
+        return full.noting(STATED)
     ring = angle_labels(np.minimum(m.theta_r, np.pi - m.theta_r))
     thinned = [_plain_sum(m.select(rows), region) for rows in (
         ring % 2 == 0, _every_second_azimuth(m, ring))]  # fmt: skip
@@ -108,57 +122,98 @@ def _every_second_azimuth(m: Measurement, ring: np.ndarray) -> np.ndarray:
 
 
 def _plain_sum(m: Measurement, region: Hemispherical) -> Part | None:
-    """Value times projected solid angle; the rest of each zone has the mean of its ring."""
-    theta = np.minimum(m.theta_r, np.pi - m.theta_r)
-    delta = m.phi_r - m.phi_i
-    angle = solid_angles(theta, delta)
-    if angle is None:
+    """``sum_k Z_k <f>_k`` over the rings ``k``, or None if the rows are on none.
+
+    ``Z_k`` is the projected solid angle of the zone of a ring without the trap, ``<f>_k``
+    the mean of its rows outside of the trap. What its rows do not cover of ``Z_k`` is
+    extrapolated, as is a ring without such rows, which has the mean of the nearest.
+    """
+    projected = projected_solid_angles(m, np.arange(m.n_rows))
+    if projected is None:
         return None
-    # No row is in the trap.
-    projected = angle * np.cos(theta) * ~_trapped(m, theta, delta, region)
-    used = np.flatnonzero(angle > 0)
-    ring = angle_labels(theta[used])
-    level = np.bincount(ring, theta[used]) / np.bincount(ring)
-    edges = np.concatenate([[0.0], 0.5 * (level[1:] + level[:-1]), [0.5 * np.pi]])
-    zones = _zones(edges, region)
-    valid = m.valid[used].astype(float)
-    share = projected[used, None] * valid
-    value = np.where(m.valid[used], m.value[used], 0.0)
-    n = level.size
-    covered, light = np.zeros((2, n, m.n_channels))
+    used = np.flatnonzero(projected > 0)
+    m, projected = m.select(used), projected[used]
+    theta = np.minimum(m.theta_r, np.pi - m.theta_r)
+    own = _around_own_mirror(m, region)
+    ring = angle_labels(theta)
+    level = np.bincount(ring, theta) / np.bincount(ring)
+    if PROJECTED_SOLID_ANGLE in m.auxiliary:
+        zones, beyond = _stated_zones(np.bincount(ring, projected), own)
+    else:
+        edges = np.concatenate([[0.0], 0.5 * (level[1:] + level[:-1]), [0.5 * np.pi]])
+        zones, beyond = _zones(edges, own), 0.0
+    share = np.where(m.valid & ~_trapped(m, theta, own)[:, None], projected[:, None], 0.0)
+    value = np.where(m.valid, m.value, 0.0)
+    covered, light = np.zeros((2, level.size, m.n_channels))
     np.add.at(covered, ring, share)
     np.add.at(light, ring, share * value)
     known = covered > 1e-12
     mean = np.divide(light, covered, out=np.zeros_like(light), where=known)
+    # No rows stand for more than the zone they are in.
+    full = covered > (1.0 - _SAME_ZONE) * zones[:, None]
+    scale = np.divide(
+        zones[:, None], covered, out=np.ones_like(covered), where=full & known
+    )
+    rest = np.where(full, 0.0, zones[:, None] - covered)
     for c in range(m.n_channels):
         if known[:, c].any() and not known[:, c].all():
             of = np.flatnonzero(known[:, c])
             near = np.abs(level[:, None] - level[of]).argmin(axis=1)
             mean[:, c] = mean[of[near], c]
-    rest = zones[:, None] - covered
-    # A ring's zone and its rows' solid angles differ in second order of its width.
-    rest = np.where(rest > 0.005 * zones[:, None], rest, 0.0)
-    missing = np.sum(rest * mean, axis=0)
-    sigma = None
+    counted = np.sum(scale * light, axis=0)
+    counts = np.sum(scale * covered, axis=0)
+    average = np.divide(counted, counts, out=np.zeros_like(counts), where=counts > 0)
+    missing = np.sum(rest * mean, axis=0) + beyond * average
+    sigma = np.zeros(m.n_channels)
     if m.sigma is not None:
-        own = np.where(m.valid[used], m.sigma[used], 0.0)
-        sigma = np.sqrt(np.sum((share * own) ** 2, axis=0))
-    covered_share = 1.0 - rest.sum(axis=0) / projected_solid_angle(region)
+        each = np.where(m.valid, m.sigma, 0.0)
+        sigma = np.sqrt(np.sum((scale[ring] * share * each) ** 2, axis=0))
+    # The value goes with the region that was asked for, at another angle of incidence.
+    whole = projected_solid_angle(own)
+    to_region = projected_solid_angle(region) / whole
     return Part(
-        light.sum(axis=0) + missing, covered_share, np.abs(missing),
-        np.zeros(m.n_channels), sigma, used.size,
-    )  # fmt: skip
+        to_region * (counted + missing),
+        1.0 - (rest.sum(axis=0) + beyond) / whole,
+        to_region * np.abs(missing),
+        np.zeros(m.n_channels),
+        None if m.sigma is None else to_region * sigma,
+        used.size,
+    )
 
 
-def _trapped(
-    m: Measurement, theta: np.ndarray, delta: np.ndarray, region: Hemispherical
-) -> np.ndarray:
-    """Rows inside the trap, which is around the mirror direction of their own source."""
+def _around_own_mirror(m: Measurement, region: Hemispherical) -> Hemispherical:
+    """The hemisphere with the trap around the mirror direction of these rows' source."""
+    if region.exclude is None:
+        return region
+    theta_i = float(np.minimum(m.theta_i, np.pi - m.theta_i).mean())
+    cone = Conical(math.degrees(theta_i), 180.0, region.exclude.half_angle_deg)
+    return Hemispherical(cone)
+
+
+def _trapped(m: Measurement, theta: np.ndarray, region: Hemispherical) -> np.ndarray:
+    """Rows inside the trap; those on its edge are not."""
     if region.exclude is None:
         return np.zeros(theta.size, dtype=bool)
-    own = np.minimum(m.theta_i, np.pi - m.theta_i)
-    cosine = np.cos(theta) * np.cos(own) - np.sin(theta) * np.sin(own) * np.cos(delta)
-    return cosine > math.cos(math.radians(region.exclude.half_angle_deg))
+    own = math.radians(region.exclude.theta_deg)
+    aside = np.cos(m.phi_r - m.phi_i)
+    cosine = np.cos(theta) * math.cos(own) - np.sin(theta) * math.sin(own) * aside
+    return cosine > math.cos(math.radians(region.exclude.half_angle_deg)) + 1e-9
+
+
+def _stated_zones(whole: np.ndarray, region: Hemispherical) -> tuple[np.ndarray, float]:
+    """What the trap leaves of each ring's stated solid angle, and what no row states, sr.
+
+    From the normal on, rings that fill ``sin^2 theta`` of the projected hemisphere end at
+    ``theta``.
+    """
+    filled = np.concatenate([[0.0], np.cumsum(whole)]) / max(math.pi, whole.sum())
+    edges = np.arcsin(np.sqrt(np.clip(filled, 0.0, 1.0)))
+    left = 1.0
+    if region.exclude is not None:
+        left = _zones(edges, region) / np.maximum(_zones(edges, Hemispherical()), 1e-300)
+    zones = whole * left
+    beyond = projected_solid_angle(region) - zones.sum()
+    return zones, beyond if beyond > 1e-6 else 0.0
 
 
 def _zones(edges: np.ndarray, region: Hemispherical) -> np.ndarray:
