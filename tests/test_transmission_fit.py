@@ -284,3 +284,19 @@ def test_one_pair_of_directions_is_evaluated_in_double_precision():
     assert there.shape == ()
     assert there.dtype == np.float64
     assert float(there / back) == pytest.approx(1.5**2, rel=1e-13)
+
+
+def test_a_real_fabric_measured_from_both_sides(real_data):
+    """Woven screen, Klems patches, all four ways of light: what is diffuse of it."""
+    m = data_formats.read(real_data / "radiance/2011-SA1.XML")
+    model = "lambert + lambert(back) + lambert_transmission"
+    result = fit(m, model, cross_validate=False, objective="l2cos", weights="rows")
+    sums = {round(np.degrees(a.theta_i)): a for a in diagnostics.data_albedo(m)}
+    assert set(ways_of(m)) == set(ALL)
+    for angle, name in ((40, "lambert1.albedo"), (140, "lambert2.albedo")):
+        reflected = sums[angle].albedo - sums[angle].transmitted
+        assert result.values[name].max() == pytest.approx(reflected, rel=0.15)
+    through = result.values["lambert_transmission.transmittance"].max()
+    assert through == pytest.approx(sums[40].transmitted, rel=0.3)
+    assert 0.5 < result.energy.max_albedo < 0.8
+    assert result.data.reciprocity_transmitted is not None

@@ -13,6 +13,7 @@ from fitting.result import AngleError, ChannelError, Colour, FitResult, Scores
 
 _MOST_ANGLES = 12
 _BIN_DEG = 10.0
+_LAST_BIN = int(180.0 / _BIN_DEG) - 1
 _MEANING = {
     "l2": "RMS of the distance over channels, 1/sr",
     "l2cos": "RMS, times the cosine, 1/sr",
@@ -114,7 +115,7 @@ def _lines(errors: Sequence[AngleError]) -> dict[str, AngleError]:
         return {degrees(e.theta_i_deg): e for e in errors}
     bins: dict[int, list[AngleError]] = {}
     for e in errors:
-        bins.setdefault(int(e.theta_i_deg // _BIN_DEG), []).append(e)
+        bins.setdefault(min(int(e.theta_i_deg // _BIN_DEG), _LAST_BIN), []).append(e)
     return {
         f"{k * _BIN_DEG:g} to {(k + 1) * _BIN_DEG:g}": _joined(group)
         for k, group in sorted(bins.items())

@@ -25,7 +25,8 @@ from fitting.reflectance.sums import at_angle, over_sky
 METHOD = (
     "sums of value times projected solid angle over the rows; the uncovered part of the "
     "hemisphere has the mean of the nearest ring, and is uncertain by all of that "
-    "(rectangular, 0 to twice); sampling by leaving out every second ring or azimuth"
+    "(rectangular, 0 to twice); sampling by leaving out every second ring or azimuth, but "
+    "for files that state the solid angles"
 )
 METHOD_OF_DIRECTIONS = (
     "the nearest row within 1 deg, or the mean of rows within 7.5 deg weighted by "
