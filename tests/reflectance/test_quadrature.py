@@ -148,7 +148,12 @@ def check_bounds(count: int, seed: int) -> None:
 
 @pytest.mark.slow
 def test_the_error_bound_holds_for_every_lobe():
-    check_bounds(100, 1)
+    check_bounds(30, 1)
+
+
+@pytest.mark.full
+def test_the_error_bound_holds_for_many_lobes():
+    check_bounds(300, 2)
 
 
 @pytest.mark.parametrize("alpha", [1e-3, 0.02, 0.3, 1.0])
