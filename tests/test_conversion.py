@@ -22,6 +22,7 @@ def glossy():
     return fit(data, "lambert + ggx", cross_validate=False)
 
 
+@pytest.mark.slow
 def test_the_same_surface_under_another_name(glossy):
     """GGX is Student's t with gamma = 2, the width and the coefficients being the same."""
     result = fit(resample(glossy), "lambert + student_t", cross_validate=False)

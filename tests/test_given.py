@@ -93,7 +93,7 @@ def test_a_metal_of_known_index(tmp_path):
     "settings",
     [
         {"energy": "hard"},
-        {"per_channel_shape": True},
+        pytest.param({"per_channel_shape": True}, marks=pytest.mark.slow),
         {"objective": "chi2", "noise": (0.01, 1e-4), "bounds": {"ggx.alpha": (0.1, 0.4)}},
     ],
     ids=["hard", "per channel", "chi2"],

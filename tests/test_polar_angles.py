@@ -17,7 +17,12 @@ from fitting.rows import select_rows
 
 
 @pytest.mark.parametrize(
-    "expression", ["lambert + beckmann", "student_t", "beckmann(retro)", "gtr"]
+    "expression",
+    [
+        "lambert + beckmann",
+        "beckmann(retro)",
+        *(pytest.param(e, marks=pytest.mark.slow) for e in ("student_t", "gtr")),
+    ],
 )
 def test_the_table_changes_nothing(expression: str):
     with jax.enable_x64(True):

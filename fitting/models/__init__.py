@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 
 from fitting.models.lobe import AxisPeak, Lobe, Passage, Peak, Shape, SlopeWidths, Way
 
@@ -63,7 +64,7 @@ LOBES: dict[str, str] = {
 
 def lobe_names() -> tuple[str, ...]:
     """All lobes that expressions know, those of installed packages included."""
-    return (*LOBES, *(e.name for e in entry_points(group="fitting.models")))
+    return (*LOBES, *_installed())
 
 
 def lobe_class(name: str) -> type[Lobe]:
@@ -79,6 +80,10 @@ def lobe_class(name: str) -> type[Lobe]:
         from fitting.models.lobe_file import lobe_of_file
 
         return lobe_of_file(name)
-    for entry in entry_points(group="fitting.models", name=name):
-        return entry.load()
-    raise KeyError(name)
+    return _installed()[name].load()
+
+
+@functools.cache
+def _installed() -> dict[str, EntryPoint]:
+    """Lobes of installed packages; looking for them reads the metadata of all packages."""
+    return {e.name: e for e in entry_points(group="fitting.models")}

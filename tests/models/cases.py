@@ -40,13 +40,19 @@ def _first_of_their_kind() -> Iterator[str]:
 
 
 VARIANTS: list[Variant] = [v for n in LOBES for v in variants.of_name(n)]
+_ALONE = {v.name for v in VARIANTS}
 COMBINED: list[Variant] = [
-    v
-    for n in LOBES
-    for v in variants.of_name(n, combined=True)
-    if v.name not in {w.name for w in VARIANTS}
+    v for n in LOBES for v in variants.of_name(n, combined=True) if v.name not in _ALONE
 ]
-QUICK: list[Variant] = [v for v in VARIANTS if v.name in set(_first_of_their_kind())]
+_FIRST = set(_first_of_their_kind())
+QUICK: list[Variant] = [v for v in VARIANTS if v.name in _FIRST]
+# The tangent frame is one piece of code: every run looks at it where it reflects and where
+# it refracts, the slow one with every lobe.
+FEW: list[Variant] = [
+    v
+    for v in QUICK
+    if "(aniso)" not in v.name or v.name in ("ggx(aniso)", "rough_dielectric(aniso)")
+]
 DEFAULTS: list[Variant] = [v for v in VARIANTS if v.name in LOBES]
 
 

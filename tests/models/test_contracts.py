@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from cases import COMBINED, DEFAULTS, QUICK, VARIANTS, default_and_slow, each
+from cases import COMBINED, DEFAULTS, FEW, QUICK, VARIANTS, default_and_slow, each
 
 import fitting.models
 from fitting.albedo import albedo_basis, model_albedo
@@ -89,7 +89,7 @@ def test_registry_matches_the_files():
         assert name == lobe_class(name).NAME
 
 
-@default_and_slow(QUICK)
+@default_and_slow(FEW)
 def test_contracts(variant: Variant):
     """float32 overflows first, so the default run is float32."""
     hasty = exercises(variant, hasty=True)

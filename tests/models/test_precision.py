@@ -12,7 +12,7 @@ from pathlib import Path
 
 import mpmath as mp
 import pytest
-from cases import COMBINED, DEFAULTS, QUICK, VARIANTS, each
+from cases import COMBINED, DEFAULTS, FEW, QUICK, VARIANTS, each
 
 from fitting.stress import Variant, precision, table
 from fitting.stress.exercise import Exercise
@@ -49,7 +49,7 @@ def after(seconds: float) -> Callable[[], bool]:
 
 
 @precisions
-@each(QUICK)
+@each(FEW)
 def test_error_in_ulp(variant: Variant, name: str):
     check(variant, name, 120, 0.5)
 

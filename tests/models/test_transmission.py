@@ -183,6 +183,7 @@ def test_lobes_between_other_media_do_not_make_a_reciprocal_sum(expression, reci
     assert Model(expression).reciprocal is reciprocal
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
 def test_derivatives_of_the_transmitted_albedo_are_finite(precision):
     lobe = lobe_class("rough_dielectric")()

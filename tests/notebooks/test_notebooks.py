@@ -24,6 +24,8 @@ def test_runs(path, tmp_path, monkeypatch):
     # Figures are drawn and thrown away; the user's own configuration stays out of it.
     monkeypatch.setenv("MPLCONFIGDIR", str(tmp_path / "matplotlib"))
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    # As the other tests compile their fits.
+    monkeypatch.setenv("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     notebook = nbformat.read(path, as_version=4)

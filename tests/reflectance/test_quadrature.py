@@ -157,7 +157,9 @@ def test_the_error_bound_holds_for_many_lobes():
 
 
 @pytest.mark.parametrize("alpha", [1e-3, 0.02, 0.3, 1.0])
-@pytest.mark.parametrize("theta", [0.0, 60.0, 89.0])
+@pytest.mark.parametrize(
+    "theta", [60.0, *(pytest.param(t, marks=pytest.mark.slow) for t in (0.0, 89.0))]
+)
 def test_the_error_bound_holds(alpha, theta):
     surface = clear("ggx", alpha=alpha)
     trapped = Hemispherical(Conical(theta, 180.0, 5.0))
