@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -146,21 +147,35 @@ def _values_of_widths(
     width: float,
 ) -> np.ndarray:
     """Values of a parameter with which a lobe is about as wide as the data show it."""
-    share = np.linspace(0.0, 1.0, _WIDTH_NODES)
-    nodes = ends[0] + (ends[1] - ends[0]) * share
-    if parameter.scale == "log":
-        nodes = ends[0] * (ends[1] / ends[0]) ** share
-    fixed = {n: jnp.asarray(v) for n, v in shape.items()}
-    peak = jax.vmap(lambda v: lobe.peak({**fixed, parameter.name: v}))(jnp.asarray(nodes))
-    if peak is None:
+    found = _sizes(lobe, tuple(shape.items()), parameter.name, parameter.scale, ends)
+    if found is None:
         return np.full(len(_WIDTH_FACTORS), shape[parameter.name])
-    if isinstance(peak, AxisPeak):
-        sizes = np.sqrt(2.0 / np.maximum(np.asarray(peak.exponent), 1e-3))
-    else:
-        x, y = np.asarray(peak.alpha_x), np.asarray(peak.alpha_y)
-        sizes = x if np.ptp(x) > 0 else y
+    nodes, sizes = found
     wanted = np.log(width * np.array(_WIDTH_FACTORS))
     return nodes[np.argmin(np.abs(np.log(sizes)[:, None] - wanted), axis=0)]
+
+
+@functools.lru_cache(maxsize=256)
+def _sizes(
+    lobe: Lobe,
+    shape: tuple[tuple[str, float], ...],
+    name: str,
+    scale: str,
+    ends: tuple[float, float],
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Values of a parameter and the width of the peak at each; the same for all data."""
+    share = np.linspace(0.0, 1.0, _WIDTH_NODES)
+    nodes = ends[0] + (ends[1] - ends[0]) * share
+    if scale == "log":
+        nodes = ends[0] * (ends[1] / ends[0]) ** share
+    fixed = {n: jnp.asarray(v) for n, v in shape}
+    peak = jax.vmap(lambda v: lobe.peak({**fixed, name: v}))(jnp.asarray(nodes))
+    if peak is None:
+        return None
+    if isinstance(peak, AxisPeak):
+        return nodes, np.sqrt(2.0 / np.maximum(np.asarray(peak.exponent), 1e-3))
+    x, y = np.asarray(peak.alpha_x), np.asarray(peak.alpha_y)
+    return nodes, x if np.ptp(x) > 0 else y
 
 
 def thinned(problem: Problem) -> Problem:
