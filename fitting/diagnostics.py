@@ -8,7 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from data_formats import Measurement
-from fitting.solid_angle import angle_labels, incidence_labels, projected_solid_angles
+from fitting.solid_angle import (
+    angle_labels,
+    from_normal,
+    incidence_labels,
+    projected_solid_angles,
+)
 
 _SAME_DIRECTION = 1e-3
 _WIDEST_GAP = np.radians(20.0)
@@ -109,10 +114,10 @@ def _tables(m: Measurement, chosen: np.ndarray, factor: float = 1.0) -> list[_Ta
         rows = np.flatnonzero(some & (label == k))
         # Both halves folded onto one: isotropic data are compared as if symmetric.
         delta = np.abs(np.arctan2(*_sin_cos(m.phi_r[rows] - m.phi_i[rows])))
-        table = _Rings.of(_from_normal(m.theta_r[rows]), delta, mean[rows])
+        table = _Rings.of(from_normal(m.theta_r[rows]), delta, mean[rows])
         if table.theta.size < 3:
             continue
-        tables.append((float(_from_normal(m.theta_i[rows]).mean()), table))
+        tables.append((float(from_normal(m.theta_i[rows]).mean()), table))
     return tables
 
 
@@ -130,10 +135,6 @@ def _median(differences: list[np.ndarray]) -> tuple[float, int] | None:
     if joined.size == 0:
         return None
     return float(np.median(joined)), int(joined.size)
-
-
-def _from_normal(theta: np.ndarray) -> np.ndarray:
-    return np.minimum(theta, np.pi - theta)
 
 
 @dataclass(frozen=True)

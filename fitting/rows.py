@@ -12,7 +12,7 @@ import numpy as np
 from data_formats import Measurement, MeasurementError
 from fitting import geometry
 from fitting.models import Way
-from fitting.solid_angle import solid_angle_weights
+from fitting.solid_angle import from_normal, solid_angle_weights
 
 _LARGEST = 1e100
 
@@ -34,11 +34,6 @@ def ways_of(measurement: Measurement) -> np.ndarray:
     back = back | (~through & (measurement.theta_r > 0.5 * math.pi + 1e-9))
     reflected = np.where(back, "back", "front")
     return np.where(through, np.where(back, "up", "down"), reflected)
-
-
-def _from_normal(theta: np.ndarray) -> np.ndarray:
-    """Angle to the normal of the side that a direction is on, rad."""
-    return np.minimum(theta, math.pi - theta)
 
 
 @dataclass(frozen=True)
@@ -65,7 +60,7 @@ def select_rows(
     """
     m = measurement
     limit = math.radians(max_theta_deg) + 1e-6
-    steepest = np.maximum(_from_normal(m.theta_i), _from_normal(m.theta_r))
+    steepest = np.maximum(from_normal(m.theta_i), from_normal(m.theta_r))
     way = ways_of(m)
     unknown = ~np.isin(way, ways)
     grazing = ~unknown & (steepest > limit)

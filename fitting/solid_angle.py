@@ -37,6 +37,11 @@ def solid_angle_weights(
     return weights
 
 
+def from_normal(theta: np.ndarray) -> np.ndarray:
+    """Angle to the normal of the side of the sample that a direction is on, rad."""
+    return np.minimum(theta, np.pi - theta)
+
+
 def projected_solid_angles(m: Measurement, rows: np.ndarray) -> np.ndarray | None:
     """Projected solid angle in sr of some rows of one incidence, all on one side.
 
@@ -46,7 +51,7 @@ def projected_solid_angles(m: Measurement, rows: np.ndarray) -> np.ndarray | Non
     stated = m.auxiliary.get(PROJECTED_SOLID_ANGLE)
     if stated is not None:
         return stated[rows] / np.unique(np.round(m.phi_i[rows], 6)).size
-    theta_r = np.minimum(m.theta_r[rows], np.pi - m.theta_r[rows])
+    theta_r = from_normal(m.theta_r[rows])
     angle = solid_angles(theta_r, m.phi_r[rows] - m.phi_i[rows])
     return None if angle is None else angle * np.cos(theta_r)
 

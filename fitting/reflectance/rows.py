@@ -11,7 +11,7 @@ import numpy as np
 
 from data_formats import Measurement
 from fitting.reflectance.beams import Directional, unit_vector
-from fitting.solid_angle import incidence_labels
+from fitting.solid_angle import from_normal, incidence_labels
 
 NEAR_DEG = 1.0
 _FARTHEST_DEG = 7.5
@@ -89,13 +89,13 @@ def incidences(
     if some.symmetry == "anisotropic":
         at = 0.0 if incident is None else math.radians(incident.phi_deg)
         turned = np.abs(np.arctan2(np.sin(some.phi_i - at), np.cos(some.phi_i - at)))
-        upright = np.minimum(some.theta_i, np.pi - some.theta_i) < 1e-3
+        upright = from_normal(some.theta_i) < 1e-3
         if incident is None and np.any((turned > 0.02) & ~upright):
             raise Missing("it is anisotropic, and uniform light needs all azimuths")
         some = some.select((turned <= 0.02) | upright)
         if not some.n_rows:
             raise Missing(f"it has no light from the azimuth {math.degrees(at):g} deg")
-    theta = np.minimum(some.theta_i, np.pi - some.theta_i)
+    theta = from_normal(some.theta_i)
     label = incidence_labels(theta)
     groups = [some.select(label == k) for k in np.unique(label)]
     angles = np.array([theta[label == k].mean() for k in np.unique(label)])
@@ -152,7 +152,7 @@ def _between(m: Measurement, incident: Directional, collected: Directional) -> P
 
 def _at_detector(m: Measurement, theta_deg: float, azimuth_deg: float) -> Part:
     """Rows of one incidence near a detector's direction, averaged."""
-    theta_r = np.minimum(m.theta_r, np.pi - m.theta_r)
+    theta_r = from_normal(m.theta_r)
     azimuth, wanted = m.phi_r, math.radians(azimuth_deg)
     if m.symmetry != "anisotropic":
         azimuth = m.phi_r - m.phi_i
@@ -162,7 +162,7 @@ def _at_detector(m: Measurement, theta_deg: float, azimuth_deg: float) -> Part:
     distance = _angle(
         _vectors(theta_r, azimuth), unit_vector(theta_deg, math.degrees(wanted))
     )
-    upright = np.minimum(m.theta_i, np.pi - m.theta_i) < 1e-3
+    upright = from_normal(m.theta_i) < 1e-3
     if m.symmetry != "anisotropic" and upright.all():
         # Light along the normal knows no azimuth.
         distance = np.abs(np.degrees(theta_r) - theta_deg)

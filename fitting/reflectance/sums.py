@@ -18,7 +18,7 @@ from fitting.reflectance.beams import (
 )
 from fitting.reflectance.rings import arc
 from fitting.reflectance.rows import Missing, Part, at_incidence, incidences, mixed
-from fitting.solid_angle import angle_labels, projected_solid_angles
+from fitting.solid_angle import angle_labels, from_normal, projected_solid_angles
 
 LEAST_COVERED = 0.5
 STATED = (
@@ -94,7 +94,7 @@ def _sum(m: Measurement, region: Hemispherical) -> Part:
     full = _plain_sum(m, region)
     if full is None or np.min(full.covered) < LEAST_COVERED:
         share = percent(0.0 if full is None else float(np.min(full.covered)))
-        angle = math.degrees(float(np.minimum(m.theta_i, np.pi - m.theta_i).mean()))
+        angle = math.degrees(float(from_normal(m.theta_i).mean()))
         raise Missing(
             f"at {angle:.1f} deg the rows are not on rings around the normal"
             if full is None
@@ -102,7 +102,7 @@ def _sum(m: Measurement, region: Hemispherical) -> Part:
         )
     if PROJECTED_SOLID_ANGLE in m.auxiliary:
         return full.noting(STATED)
-    ring = angle_labels(np.minimum(m.theta_r, np.pi - m.theta_r))
+    ring = angle_labels(from_normal(m.theta_r))
     thinned = [_plain_sum(m.select(rows), region) for rows in (
         ring % 2 == 0, _every_second_azimuth(m, ring))]  # fmt: skip
     differences = [np.abs(t.value - full.value) for t in thinned if t is not None]
@@ -133,7 +133,7 @@ def _plain_sum(m: Measurement, region: Hemispherical) -> Part | None:
         return None
     used = np.flatnonzero(projected > 0)
     m, projected = m.select(used), projected[used]
-    theta = np.minimum(m.theta_r, np.pi - m.theta_r)
+    theta = from_normal(m.theta_r)
     own = _around_own_mirror(m, region)
     ring = angle_labels(theta)
     level = np.bincount(ring, theta) / np.bincount(ring)
@@ -185,7 +185,7 @@ def _around_own_mirror(m: Measurement, region: Hemispherical) -> Hemispherical:
     """The hemisphere with the trap around the mirror direction of these rows' source."""
     if region.exclude is None:
         return region
-    theta_i = float(np.minimum(m.theta_i, np.pi - m.theta_i).mean())
+    theta_i = float(from_normal(m.theta_i).mean())
     cone = Conical(math.degrees(theta_i), 180.0, region.exclude.half_angle_deg)
     return Hemispherical(cone)
 
