@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, field
 
 from fitting.scene.lights import (
     Azimuth,
@@ -237,7 +237,9 @@ class Scene(_Table, frozen=True, kw_only=True):
     seen: Annotated[
         Seen, Meta(description="[seen], what is seen of the sample, told apart by kind.")
     ]
-    viewer: Annotated[Viewer, Meta(description="[viewer], who looks at it.")] = Viewer()
+    viewer: Annotated[Viewer, Meta(description="[viewer], who looks at it.")] = field(
+        default_factory=Viewer
+    )
     tolerance: Annotated[
         Tolerance,
         Meta(description="[tolerance.NAME], how far the model may be from the data."),
