@@ -98,13 +98,15 @@ class CrossValidation(msgspec.Struct, frozen=True):
     """Errors on incidence angles that the fit did not see, each left out in turn.
 
     ``objective`` is the RMS over all held-out rows, ``typical`` the geometric mean of the
-    angles' RMS values, by which models are compared, ``l2`` as in `Scores`.
+    angles' RMS values, by which models are compared, ``l2`` as in `Scores`; ``scores`` are
+    all the objectives over all held-out rows.
     """
 
     objective: float
     typical: float
     l2: float
     by_angle: list[AngleError]
+    scores: Scores | None = None
 
 
 class Energy(msgspec.Struct, frozen=True):

@@ -12,7 +12,7 @@ import numpy as np
 from fitting import judge
 from fitting.model import Model
 from fitting.options import FitOptions
-from fitting.result import AngleError, CrossValidation
+from fitting.result import CrossValidation
 from fitting.rows import Rows
 from fitting.search import predicted_by, problems
 from fitting.solve import refine
@@ -27,11 +27,36 @@ def cross_validation(
     found: list[Found],
     width: float,
 ) -> CrossValidation | None:
-    """Refit without each angle of incidence, from the minimum of the whole."""
+    """Errors on every angle of incidence, predicted without it; None for a single angle."""
+    predicted = held_out_predictions(rows, model, options, found, width)
+    if predicted is None:
+        return None
     theta = judge.theta_i_of(rows)
-    errors: list[AngleError] = []
-    total, count, squares = 0.0, 0, 0.0
-    for held in judge.folds(rows):
+    r = judge.residuals(rows, predicted, objective, options)
+    errors = [
+        judge.angle_error(rows, r, predicted, theta, held) for held in judge.folds(rows)
+    ]
+    return CrossValidation(
+        objective=math.sqrt(float(np.sum(r**2)) / max(int(rows.valid.sum()), 1)),
+        typical=math.exp(np.mean([math.log(max(e.objective, 1e-300)) for e in errors])),
+        l2=judge.l2(rows, predicted),
+        by_angle=errors,
+        scores=judge.scores(rows, predicted, options),
+    )
+
+
+def held_out_predictions(
+    rows: Rows, model: Model, options: FitOptions, found: list[Found], width: float
+) -> np.ndarray | None:
+    """Values ``(n, c)`` of every row by a fit that has not seen its angle of incidence.
+
+    Each fit is refined from the minimum of the whole. None for a single angle.
+    """
+    folds = judge.folds(rows)
+    if not folds:
+        return None
+    out = np.empty(rows.value.shape)
+    for held in folds:
         keep = np.ones(rows.index.size)
         keep[held] = 0.0
         ends = []
@@ -40,17 +65,5 @@ def cross_validation(
         for p, f in zip(problems(rows, model, options, **kwargs), found, strict=True):
             u, x = jnp.asarray(f.solution.u), jnp.asarray(f.solution.x)
             ends.append(Found(p, jax.device_get(refine(p, u, x)), ()))
-        predicted = predicted_by(ends, rows)
-        r = judge.residuals(rows, predicted, objective, options)
-        errors.append(judge.angle_error(rows, r, predicted, theta, held))
-        total += float(np.sum(r[held] ** 2))
-        count += int(rows.valid[held].sum())
-        squares += errors[-1].l2 ** 2 * held.size
-    if not errors:
-        return None
-    return CrossValidation(
-        objective=math.sqrt(total / max(count, 1)),
-        typical=math.exp(np.mean([math.log(max(e.objective, 1e-300)) for e in errors])),
-        l2=math.sqrt(squares / rows.index.size),
-        by_angle=errors,
-    )
+        out[held] = predicted_by(ends, rows)[held]
+    return out
