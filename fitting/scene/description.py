@@ -114,9 +114,12 @@ class Histogram(_Table, frozen=True, kw_only=True, tag_field="kind", tag="histog
         ),
     ] = None
     rows: Annotated[
-        tuple[tuple[Polar, Azimuth, Polar, Azimuth, NotNegative], ...] | None,
+        Annotated[
+            tuple[tuple[Polar, Azimuth, Polar, Azimuth, NotNegative], ...],
+            Meta(min_length=1),
+        ]
+        | None,
         Meta(
-            min_length=1,
             description="The same in the scene file: [[theta_i, phi_i, theta_r, phi_r, "
             "weight], ...].",
         ),

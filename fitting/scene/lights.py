@@ -32,9 +32,11 @@ class Spectrum(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ),
     ] = None
     bands: Annotated[
-        tuple[tuple[Wavelength, Wavelength, NotNegative], ...] | None,
+        Annotated[
+            tuple[tuple[Wavelength, Wavelength, NotNegative], ...], Meta(min_length=1)
+        ]
+        | None,
         Meta(
-            min_length=1,
             description="[from, to, power] in nm: a constant power per nm in each, 0 "
             "elsewhere; overlapping ones add up.",
         ),
