@@ -11,8 +11,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from types import ModuleType
 
@@ -22,9 +21,10 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.special
 
-from fitting.geometry import Geometry, from_angles
 from fitting.model import Model
 from fitting.models import LOBES
+from fitting.tradeoff.evaluation_cost import Kernel, Precision, directions
+from fitting.tradeoff.timing import timed
 
 COUNT = 1 << 17
 REPEATS = 7
@@ -43,26 +43,6 @@ class Cost:
     numpy: float
     flops: float
     transcendentals: float
-
-
-def directions(count: int) -> Geometry:
-    """Pairs of directions all over the hemisphere, half of them near the mirror."""
-    rng = np.random.default_rng(0)
-    theta_i, theta_r = np.arccos(rng.uniform(0.05, 1.0, (2, count)))
-    phi = rng.uniform(0, 2 * np.pi, count)
-    near = rng.random(count) < 0.5
-    theta_r = np.where(near, np.clip(theta_i + rng.normal(0, 0.1, count), 0, 1.5), theta_r)
-    return from_angles(theta_i, 0.0, theta_r, np.where(near, np.pi + 0.2 * phi, phi))
-
-
-def seconds(run: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Least time of a call, which other load disturbs least."""
-    best = np.inf
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        run()
-        best = min(best, time.perf_counter() - begin)
-    return best
 
 
 @contextlib.contextmanager
@@ -100,45 +80,31 @@ def cost(expression: str, count: int = COUNT) -> Cost:
     lobe = Model(expression).lobes[0]
     plain = {p.name: p.default for p in lobe.parameters() if not p.coefficient}
     g = directions(count)
+
+    def with_tangents(shape, geometry):
+        slopes = jax.jacfwd(lobe.basis)(shape, geometry) if shape else ()
+        return lobe.basis(shape, geometry), slopes
+
     value: dict[str, float] = {}
     jacobian: dict[str, float] = {}
-    counted: dict[str, float] = {}
-    for name, x64 in (("f32", False), ("f64", True)):
-        with jax.enable_x64(x64):
-            shape = {n: jnp.asarray(v) for n, v in plain.items()}
-            geometry = jax.tree.map(jnp.asarray, g)
-
-            def basis(shape, geometry):
-                return lobe.basis(shape, geometry)
-
-            def with_tangents(shape, geometry):
-                slopes = jax.jacfwd(basis)(shape, geometry) if shape else ()
-                return basis(shape, geometry), slopes
-
-            compiled = jax.jit(basis).lower(shape, geometry).compile()
-            value[name] = _per_evaluation(compiled, shape, geometry, count)
-            counted = compiled.cost_analysis() or {}
-            both = jax.jit(with_tangents).lower(shape, geometry).compile()
-            jacobian[name] = _per_evaluation(both, shape, geometry, count)
+    counted = (0.0, 0.0)
+    precisions: dict[str, Precision] = {"f32": "float32", "f64": "float64"}
+    for name, precision in precisions.items():
+        of_value = Kernel(lobe.basis, plain, g, precision=precision)
+        of_both = Kernel(with_tangents, plain, g, precision=precision)
+        value[name] = _per_evaluation(of_value, count)
+        jacobian[name] = _per_evaluation(of_both, count)
+        counted = of_value.counted()
     few = directions(count // 8)
     numbers = {n: np.float64(v) for n, v in plain.items()}
     with plain_numpy(), np.errstate(all="ignore"):
-        numpy = seconds(lambda: lobe.basis(numbers, few), 3) / (count // 8)
-    return Cost(
-        value,
-        jacobian,
-        numpy,
-        counted.get("flops", 0.0) / count,
-        counted.get("transcendentals", 0.0) / count,
-    )
+        numpy = timed(lambda: lobe.basis(numbers, few), 3).least / (count // 8)
+    return Cost(value, jacobian, numpy, counted[0] / count, counted[1] / count)
 
 
-def _per_evaluation(compiled, shape, geometry, count: int) -> float:
-    def run() -> None:
-        jax.block_until_ready(compiled(shape, geometry))
-
-    run()
-    return seconds(run) / count
+def _per_evaluation(kernel: Kernel, count: int) -> float:
+    # The least time is what other load disturbs least.
+    return timed(kernel.run, REPEATS, warm=False).least / count
 
 
 def row(name: str, own: Cost, unit: float) -> str:

@@ -14,13 +14,17 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import lobe_costs
+import numpy as np
 import pytest
 import synthetic
+from scipy.stats import spearmanr
 
 from fitting import FitOptions, Model
 from fitting.problem import prepare
 from fitting.reduced import evaluate
 from fitting.rows import select_rows
+from fitting.tradeoff.evaluation_cost import TRANSCENDENTAL, evaluation_cost
+from fitting.tradeoff.timing import timed
 
 pytestmark = pytest.mark.slow
 
@@ -50,11 +54,35 @@ def test_one_pass_with_the_table_of_polar_angles(line, expression: str, least: f
 
         def time_of(p) -> float:
             jax.block_until_ready(compiled(p, *point))
-            return lobe_costs.seconds(lambda: jax.block_until_ready(compiled(p, *point)))
+            return timed(lambda: jax.block_until_ready(compiled(p, *point)), 7).least
 
         ratio = time_of(plain) / time_of(problem)
     line(f"{expression}, {len(rows.index)} rows: {ratio:.1f} times faster with the table")
     assert ratio > least
+
+
+def test_operations_follow_the_clock(line):
+    """The weight of a transcendental: what makes times most nearly proportional."""
+    found = [
+        evaluation_cost(name, 1, Model(name).defaults(), precisions=("float32",))
+        for name in lobe_costs.variants()
+    ]
+    ns = np.log([c.precisions[0].batched_ns.least for c in found])
+    flops = np.array([c.count.flops for c in found])
+    transcendentals = np.array([c.count.transcendentals for c in found])
+
+    def spread(weight: float) -> float:
+        return float(np.std(ns - np.log(flops + weight * transcendentals)))
+
+    of_weight = {w: spread(w) for w in (0.0, 10.0, TRANSCENDENTAL, 100.0, 1000.0)}
+    counted = np.log(flops + TRANSCENDENTAL * transcendentals)
+    ratio = ns - counted
+    factor = np.exp(np.median(np.abs(ratio - np.median(ratio))))
+    line("  ".join(f"weight {w:g}: {s:.2f}" for w, s in of_weight.items()))
+    line(f"half of the lobes are within a factor of {factor:.2f} of the fit")
+    assert of_weight[TRANSCENDENTAL] < min(of_weight[0.0], of_weight[1000.0])
+    assert factor < 2.5
+    assert spearmanr(ns, counted).statistic > 0.7
 
 
 def test_the_table_of_the_readme_names_every_lobe():
