@@ -140,7 +140,7 @@ def rgb_colour(
     r = np.asarray(values, dtype=np.float64)
     if r.shape != (3,) or not np.all(np.isfinite(r)):
         raise ColourError(f"bands {', '.join(names)}: expected three finite numbers")
-    to_xyz = primaries = _srgb_to_xyz()
+    to_xyz = primaries = srgb_to_xyz()
     bands, assumption = "RGB", "R, G, B are taken as linear values of the sRGB primaries"
     if "X" in upper:
         bands, to_xyz = "XYZ", 100.0 * np.eye(3)
@@ -162,27 +162,27 @@ def delta_e_2000(lab1: ArrayLike, lab2: ArrayLike) -> np.ndarray:
 def tristimulus_weights(
     wavelengths_nm: np.ndarray, *, illuminant: str = ILLUMINANT, observer: str = OBSERVER,
     interpolation: Interpolation = "cubic", extrapolation: Extrapolation = "constant",
-    step_nm: float = 1.0,
+    step_nm: float = 1.0, range_nm: tuple[float, float] = (0.0, np.inf),
 ) -> TristimulusWeights:  # fmt: skip
     """Weights of values at ascending wavelengths ``(c,)``, normalised to 100 in Y.
 
-    The sum is over the range of both tables. Between wavelengths a spectrum is linear or
-    the cubic through the four nearest (Lagrange's, as in ASTM E2022); outside it keeps its
-    last value (CIE 15:2018), or, with ``none``, the sum ends and white is
-    relative to the same range. Raises `ColourError`.
+    The sum is over the range of both tables, within ``range_nm``. Between wavelengths a
+    spectrum is linear or the cubic through the four nearest (Lagrange's, as in ASTM E2022);
+    outside it keeps its last value (CIE 15:2018), or, with ``none``, the sum ends and white
+    is relative to the same range. Raises `ColourError`.
     """
     w = np.asarray(wavelengths_nm, dtype=np.float64)
     if w.size < 4 or np.any(np.diff(w) <= 0):
         raise ColourError("wavelengths: expected at least four different ones, ascending")
     colour = colour_science()
-    source_name = _known("illuminant", illuminant, colour.SDS_ILLUMINANTS)
-    observer_name = _known("observer", observer, colour.MSDS_CMFS)
+    source_name = known_name("illuminant", illuminant, colour.SDS_ILLUMINANTS)
+    observer_name = known_name("observer", observer, colour.MSDS_CMFS)
     cmfs, source = colour.MSDS_CMFS[observer_name], colour.SDS_ILLUMINANTS[source_name]
     if "x_bar" not in cmfs.signals:
         known = f"it has {', '.join(cmfs.signals)}; use for instance {OBSERVER!r}"
         raise ColourError(f"observer {observer!r} gives no XYZ: {known}")
-    low = max(cmfs.wavelengths[0], source.wavelengths[0])
-    high = min(cmfs.wavelengths[-1], source.wavelengths[-1])
+    low = max(cmfs.wavelengths[0], source.wavelengths[0], range_nm[0])
+    high = min(cmfs.wavelengths[-1], source.wavelengths[-1], range_nm[1])
     grid = np.arange(np.ceil(low / step_nm) * step_nm, high + 1e-9, step_nm)
     table = np.stack([np.interp(grid, cmfs.wavelengths, v) for v in cmfs.values.T], axis=1)
     table = table * np.interp(grid, source.wavelengths, source.values)[:, None]
@@ -211,7 +211,7 @@ def colour_science() -> Any:
 def _colour(
     xyz: np.ndarray, white: np.ndarray, cov: np.ndarray | None, **context: Any
 ) -> ObjectColour:
-    colour, primaries, total = colour_science(), _srgb_to_xyz(), float(xyz.sum())
+    colour, primaries, total = colour_science(), srgb_to_xyz(), float(xyz.sum())
     adaptation = colour.adaptation.matrix_chromatic_adaptation_VonKries
     adapt = adaptation(white, primaries.sum(axis=1), transform="Bradford")
     linear = np.linalg.solve(primaries, adapt @ xyz)
@@ -257,8 +257,8 @@ def _covariance(
     return c
 
 
-def _known(kind: str, name: str, names: Iterable[str]) -> str:
-    """The table's own spelling of a name; blanks, hyphens and case do not count."""
+def known_name(kind: str, name: str, names: Iterable[str]) -> str:
+    """The table's spelling of a name, whatever its blanks, hyphens, case; `ColourError`."""
     spelling = {_plain(n): n for n in names if "_" not in n}
     listed = ", ".join(spelling.values())
     if kind == "observer":
@@ -275,7 +275,7 @@ def _plain(name: str) -> str:
     return "".join(c for c in name.casefold() if c.isalnum() or c == ".")
 
 
-def _srgb_to_xyz() -> np.ndarray:
+def srgb_to_xyz() -> np.ndarray:
     """Columns are the sRGB primaries, 100 in Y for white (IEC 61966-2-1, unrounded)."""
     colour = colour_science()
     space = colour.RGB_COLOURSPACES["sRGB"]

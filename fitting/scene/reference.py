@@ -1,0 +1,215 @@
+"""The measurement between its samples: what a rendered image is compared with.
+
+No model is involved. Values are interpolated in the half vector's chart
+(`fitting.scene.chart`), where lobes stand still, by local cubic radial basis functions
+(Wendland 2005, Scattered Data Approximation, sec. 11) of ``asinh(f / s)``: logarithmic
+above the noise floor ``s``, linear below it, so that zeros and negative values count for
+what they are. How much is smoothed, the data decide: held-out rows are to be predicted
+best. Reciprocity is used: exchanged directions are one point.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator, RegularGridInterpolator
+from scipy.ndimage import distance_transform_edt
+from scipy.spatial import cKDTree
+
+from fitting.geometry import Geometry
+from fitting.rows import Rows
+from fitting.scene.chart import Chart, HalfAngles, from_half_angles, half_angles
+from fitting.solid_angle import incidence_labels
+
+_NEIGHBOURS = {True: 64, False: 96}
+_SMOOTHINGS = (1e-2, 1.0, 1e2, 1e4)
+_FIRST_SMOOTHING = 1.0
+_HELD_OUT = 400
+_MAD_TO_SIGMA = 1.4826
+_SCATTERED, _SCATTERED_RATIO = 40, 4.0
+_FAR = 1.5
+_BEYOND = math.radians(2.5)
+_GRID = {True: (64, 31, 13), False: (25, 25, 13, 13)}
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Interpolated measurement of reflection at the front.
+
+    Make one with `interpolate`. ``smoothing`` is the data's choice, ``relative_noise`` and
+    ``floor`` (1/sr) the noise that the interpolation leaves over, per channel ``(c,)``.
+    """
+
+    chart: Chart
+    smoothing: float
+    relative_noise: np.ndarray
+    floor: np.ndarray
+    _table: RegularGridInterpolator
+    _scale: np.ndarray
+    _tree: cKDTree
+    _far: float
+    _steepest: float
+
+    def value(self, g: Geometry, *, noisy: bool = False) -> np.ndarray:
+        """BRDF ``(n, c)``, 1/sr. ``noisy``: as another measurement of the same surface with
+        the same noise would have it, to see what the noise does to an image."""
+        table = self._table(_coordinates(half_angles(g), isotropic=self.chart.isotropic))
+        c = self._scale.size
+        v = table[:, :c] + table[:, c:] if noisy else table[:, :c]
+        return self._scale * np.sinh(v)
+
+    def supported(self, g: Geometry) -> np.ndarray:
+        """``(n,)`` True where samples are near; elsewhere `value` is extrapolated."""
+        steepest = np.arccos(np.clip(np.minimum(g.cos_i, g.cos_o), -1.0, 1.0))
+        distance, _ = self._tree.query(self.chart.points(half_angles(g)))
+        return (distance <= self._far) & (steepest <= self._steepest + _BEYOND)
+
+    def nearest(self, g: Geometry) -> np.ndarray:
+        """``(n,)`` the row that is nearest to each pair of directions."""
+        return self._tree.query(self.chart.points(half_angles(g)))[1]
+
+
+def interpolate(rows: Rows, *, isotropic: bool, seed: int = 0) -> Reference:
+    """The reference of rows of light reflected at the front.
+
+    Values that are not valid in some channel are left out for all, unless too few rows are
+    complete; then channels that miss values take the mean of the others there.
+    """
+    angles = half_angles(rows.geometry)
+    chart = _chart_of(rows, angles, isotropic)
+    points = chart.points(angles)
+    value = _complete(rows)
+    rng = np.random.default_rng(seed)
+    scale = 0.3 * np.maximum(np.median(np.abs(value), axis=0), 1e-12)
+    held = rng.permutation(len(points))[: min(_HELD_OUT, len(points) // 10)]
+    kept = np.setdiff1d(np.arange(len(points)), held)
+    neighbours = min(_NEIGHBOURS[isotropic], len(kept))
+
+    def local(among: np.ndarray, columns: np.ndarray, smoothing: float) -> RBFInterpolator:
+        where, mean = _without_repeats(points[among], columns[among])
+        return RBFInterpolator(
+            where, mean, neighbors=min(neighbours, len(where)), smoothing=smoothing,
+            kernel="cubic", degree=1,
+        )  # fmt: skip
+
+    first = local(kept, np.arcsinh(value / scale), _FIRST_SMOOTHING)(points[held])
+    relative, floor = _noise(value[held], scale * np.sinh(first))
+    typical = np.median(np.abs(value), axis=0)
+    scale = np.clip(floor / np.maximum(relative, 1e-3), 1e-2 * typical, typical) + 1e-300
+    columns = np.arcsinh(value / scale)
+    misses = [
+        np.sqrt(np.mean((local(kept, columns, s)(points[held]) - columns[held]) ** 2))
+        for s in _SMOOTHINGS
+    ]
+    best = int(np.argmin(misses))
+    residual = local(kept, columns, _SMOOTHINGS[best])(points[held]) - columns[held]
+    spread = _MAD_TO_SIGMA * np.median(np.abs(residual), axis=0)
+    noise = spread * rng.standard_normal(columns.shape)
+    rbf = local(np.arange(len(points)), np.hstack([columns, noise]), _SMOOTHINGS[best])
+    relative, floor = _noise(value[held], scale * np.sinh(columns[held] + residual))
+    tree = cKDTree(points)
+    distance = tree.query(points, k=2)[0][:, 1]
+    steepest = np.arccos(np.minimum(rows.geometry.cos_i, rows.geometry.cos_o)).max()
+    return Reference(
+        chart=chart, smoothing=_SMOOTHINGS[best], relative_noise=relative, floor=floor,
+        _table=_tabulated(rbf, chart), _scale=scale, _tree=tree,
+        _far=_FAR * max(1.0, float(np.percentile(distance, 95))), _steepest=float(steepest),
+    )  # fmt: skip
+
+
+def _chart_of(rows: Rows, a: HalfAngles, isotropic: bool) -> Chart:
+    """Steps of the sampling: half vectors of one incidence, and between incidences."""
+    g = rows.geometry
+    theta_i = np.arccos(np.clip(g.cos_i, -1.0, 1.0))
+    label = incidence_labels(theta_i)
+    count = int(label.max()) + 1
+    centres = np.array([theta_i[label == k].mean() for k in range(count)])
+    azimuths = 1 if isotropic else np.unique(np.round(np.arctan2(g.wiy, g.wix), 2)).size
+    per_source = max(rows.index.size / (count * azimuths), 1.0)
+    # Half vectors fill a quarter of the solid angle that the detectors fill.
+    folded = isotropic and np.ptp(np.sign(np.sin(a.phi_d))) < 2
+    step_h = 0.5 * math.sqrt((math.pi if folded else 2 * math.pi) / per_source)
+    if count >= _SCATTERED:
+        return Chart(step_h, _SCATTERED_RATIO * step_h, isotropic)
+    gaps = np.diff(centres)
+    step_d = float(np.median(gaps)) if gaps.size else math.radians(15.0)
+    return Chart(step_h, max(step_d, step_h), isotropic)
+
+
+def _complete(rows: Rows) -> np.ndarray:
+    """Values ``(n, c)``, those that are missing from the channels that are there."""
+    value, valid = np.where(rows.valid, rows.value, 0.0), rows.valid
+    if valid.all():
+        return value
+    typical = np.sum(value, axis=0) / np.maximum(valid.sum(axis=0), 1)
+    relative = np.sum(value, axis=1) / np.maximum(valid @ typical, 1e-300)
+    return np.where(valid, value, relative[:, None] * typical)
+
+
+def _noise(value: np.ndarray, smooth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Relative noise of bright values and absolute noise of dark ones, per channel."""
+    difference, size = np.abs(value - smooth), np.abs(smooth)
+    order = np.argsort(size, axis=0)
+    quarter = max(1, len(value) // 4)
+    dark = np.take_along_axis(difference, order[:quarter], axis=0)
+    ratio = difference / np.maximum(size, 1e-300)
+    bright = np.take_along_axis(ratio, order[-quarter:], axis=0)
+    spread = (_MAD_TO_SIGMA * np.median(a, axis=0) for a in (bright, dark))
+    relative, floor = spread
+    return relative, floor
+
+
+def _without_repeats(
+    points: np.ndarray, columns: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Each point once, with the mean of its values."""
+    where, index = np.unique(np.round(points, 6), axis=0, return_inverse=True)
+    index = index.reshape(-1)
+    total = np.zeros((len(where), columns.shape[1]))
+    np.add.at(total, index, columns)
+    return where, total / np.bincount(index)[:, None]
+
+
+def _axes(isotropic: bool) -> list[np.ndarray]:
+    """Nodes of the table; ``theta_h`` is ``(pi/2) t^2``, dense where lobes are."""
+    size = _GRID[isotropic]
+    t, theta_d = np.linspace(0, 1, size[0]), np.linspace(0, 0.5 * np.pi, size[-2])
+    if isotropic:
+        return [t, theta_d, np.linspace(0, 0.5 * np.pi, size[-1])]
+    around = np.linspace(-np.pi, np.pi, size[1])
+    return [t, around, theta_d, np.linspace(0, np.pi, size[-1])]
+
+
+def _coordinates(a: HalfAngles, *, isotropic: bool) -> np.ndarray:
+    t = np.sqrt(np.clip(a.theta_h / (0.5 * np.pi), 0.0, 1.0))
+    theta_d = np.minimum(a.theta_d, 0.5 * np.pi)
+    if isotropic:
+        folded = np.arctan2(np.abs(np.sin(a.phi_d)), np.abs(np.cos(a.phi_d)))
+        return np.stack([t, theta_d, folded], axis=-1)
+    light = np.mod(a.phi_d + a.phi_h, np.pi)
+    return np.stack([t, a.phi_h, theta_d, light], axis=-1)
+
+
+def _tabulated(rbf: RBFInterpolator, chart: Chart) -> RegularGridInterpolator:
+    """The interpolant on a grid, which is evaluated a thousand times faster."""
+    axes = _axes(chart.isotropic)
+    mesh = np.meshgrid(*axes, indexing="ij")
+    shape = mesh[0].shape
+    theta_h = 0.5 * np.pi * mesh[0] ** 2
+    if chart.isotropic:
+        angles = HalfAngles(theta_h, np.zeros(shape), mesh[1], mesh[2])
+    else:
+        angles = HalfAngles(theta_h, mesh[1], mesh[2], mesh[3] - mesh[1])
+    g = from_half_angles(angles)
+    # Beyond the horizon a cell keeps the value of the nearest one before it.
+    seen = (g.cos_i > 1e-3) & (g.cos_o > 1e-3)
+    flat = HalfAngles(
+        *(getattr(angles, n)[seen] for n in ("theta_h", "phi_h", "theta_d", "phi_d"))
+    )
+    found = rbf(chart.points(flat))
+    table = np.zeros((*shape, found.shape[1]))
+    table[seen] = found
+    nearest = distance_transform_edt(~seen, return_distances=False, return_indices=True)
+    return RegularGridInterpolator(axes, table[tuple(nearest)], method="linear")
