@@ -12,7 +12,7 @@ _FEWEST = 48
 _AT_ONCE = 200_000
 _STEPS = 60
 # Steps that all starts make before the best goes on alone.
-_STEPS_OF_ALL = 6
+_STEPS_OF_ALL = 3
 
 # k patterns over directions x, y, z.
 Pattern = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]

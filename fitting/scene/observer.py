@@ -38,16 +38,12 @@ def observer_name(viewer: Viewer) -> str:
     """colour-science's name; that of 1931 for RGB and for none. Raises `SceneError`."""
     if viewer.observer.strip().lower() in ("rgb", "none"):
         return OBSERVER
-    tables = colour_science().MSDS_CMFS
+    tables: Any = colour_science().MSDS_CMFS
+    with_xyz = [name for name in tables if "x_bar" in tables[name].signals]
     try:
-        name = known_name("observer", viewer.observer, tables)
+        return known_name("observer", viewer.observer, with_xyz)
     except ColourError as error:
         raise SceneError(f"{error}; or RGB, or none") from error
-    if "x_bar" not in tables[name].signals:
-        raise SceneError(
-            f"the observer {viewer.observer!r} gives no XYZ; use for instance {OBSERVER!r}"
-        )
-    return name
 
 
 def observer(viewer: Viewer) -> Observer:
