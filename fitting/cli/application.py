@@ -14,6 +14,7 @@ _COMMANDS = {
     "convert": "Write measurements in another format.",
     "models": "List the models, or describe one in full.",
     "formats": "List the file formats, or describe one in full.",
+    "scene": "List the scenes that a model may be good enough for, or explain one.",
     "stress": "Put lobes to the test: contracts, and rounding errors against 50 digits.",
     "doctor": "Check that the installation works.",
 }
@@ -52,6 +53,14 @@ Examples:
     "convert": "Example: brdf convert paint.astm paint.csv\n",
     "models": "Examples: brdf models; brdf models ggx\n",
     "formats": "Examples: brdf formats; brdf formats csv\n",
+    "scene": """\
+Examples:
+  brdf scene                              the presets
+  brdf scene sun                          one of them, explained
+  brdf scene studio --write mine.toml     a copy to change, with comments
+  brdf scene mine.toml                    a scene of your own
+  brdf scene --fields                     everything that may stand in one
+""",
     "stress": """\
 Examples:
   brdf stress                     every lobe with every option, some minutes

@@ -46,6 +46,8 @@ def _exit_code(error: Exception) -> int:
         return UNREADABLE
     if isinstance(error, _loaded("fitting.result", "ResultError")):
         return UNREADABLE
+    if isinstance(error, _loaded("fitting.scene.description", "SceneError")):
+        return UNREADABLE
     if isinstance(error, OSError):
         return UNREADABLE
     return BUG

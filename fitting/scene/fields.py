@@ -13,7 +13,10 @@ from fitting.scene.description import Scene
 
 
 class Field(Struct, frozen=True):
-    """One key: what it expects, its default (null if it must be given) and its meaning."""
+    """One key: what it expects, its default and its meaning.
+
+    The default is null for a key that must be given, and empty for one that may be absent.
+    """
 
     key: str
     expected: str
@@ -47,7 +50,7 @@ def expected(kind: types.Type) -> str:
             _range(kind) + unit
         )
     if isinstance(kind, types.LiteralType):
-        return " or ".join(repr(v) for v in kind.values)
+        return " or ".join(map(_quoted, kind.values))
     if isinstance(kind, types.UnionType):
         parts = [expected(t) for t in kind.types if not isinstance(t, types.NoneType)]
         return " or ".join(dict.fromkeys(parts)) + unit
@@ -92,7 +95,7 @@ def _describe(kind: types.Type, path: str, out: list[Section]) -> None:
     first = tables[0]
     shared = [f for f in first.fields if all(f in t.fields for t in tables[1:])]
     if len(tables) > 1:
-        kinds = " or ".join(repr(t.tag) for t in tables)
+        kinds = " or ".join(_quoted(t.tag) for t in tables)
         said = "What it is; the other keys depend on it."
         common = [Field(str(first.tag_field), kinds, None, said), *map(_field, shared)]
         out.append(Section(head, "", common))
@@ -102,7 +105,9 @@ def _describe(kind: types.Type, path: str, out: list[Section]) -> None:
             out.append(Section(head, text, [_field(f) for f in table.fields]))
         else:
             own = [_field(f) for f in table.fields if f not in shared]
-            out.append(Section(f"{head} kind = {table.tag!r}", text, own))
+            out.append(
+                Section(f"{head} {table.tag_field} = {_quoted(table.tag)}", text, own)
+            )
     seen: set[str] = set()
     for f in (f for table in tables for f in table.fields):
         if structs(f.type) and f.encode_name not in seen:
@@ -125,13 +130,20 @@ def _field(field: types.Field) -> Field:
 
 def _default(field: types.Field) -> str:
     if field.default_factory is not msgspec.NODEFAULT:
-        return "see there"
+        return ""
     value = field.default
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, tuple):
         return "[" + ", ".join(f"{v:g}" for v in value) + "]"
-    return "" if value is None else f"{value:g}" if value != str(value) else value or '""'
+    if value is None:
+        return ""
+    return _quoted(value) if isinstance(value, str) else f"{value:g}"
+
+
+def _quoted(text: object) -> str:
+    """As TOML writes it."""
+    return f'"{text}"'
 
 
 def _range(kind: types.FloatType | types.IntType) -> str:

@@ -30,7 +30,7 @@ def load_scene(name_or_path: str | os.PathLike) -> Scene:
     """
     if str(name_or_path) in PRESETS:
         name = str(name_or_path)
-        return _scene(preset_text(name), f"preset {name}", name, Path())
+        return _scene(preset_text(name), f"preset {name}", name)
     path = Path(name_or_path)
     if not path.is_file():
         raise SceneError(_no_file(name_or_path, path))
@@ -43,18 +43,18 @@ def preset_text(name: str) -> str:
     return file.read_text(encoding="utf-8")
 
 
-def _scene(text: str, called: str, name: str, folder: Path) -> Scene:
+def _scene(text: str, called: str, name: str, folder: Path | None = None) -> Scene:
     try:
         plain = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise SceneError(f"{called}: not TOML, {error}; {_HELP}") from error
     try:
-        scene = checked(_with_folder(plain, folder))
-        scene = scene if scene.name else replace(scene, name=name)
-        _look_up(scene)
+        scene = checked(plain if folder is None else _with_folder(plain, folder))
+        if folder is not None:
+            _look_up(scene)
     except SceneError as error:
         raise SceneError(f"{called}: {error}") from error
-    return scene
+    return scene if scene.name else replace(scene, name=name)
 
 
 def _look_up(scene: Scene) -> None:

@@ -10,7 +10,9 @@ import pytest
 
 from fitting.sample import sample_path
 
-COMMANDS = ("fit", "info", "score", "convert", "models", "stress", "formats", "doctor")
+COMMANDS = (
+    "fit", "info", "score", "convert", "models", "stress", "formats", "scene", "doctor",
+)  # fmt: skip
 HEAVY = ("jax", "equinox", "optimistix", "colour", "matplotlib")
 SHOW_MODULES = (
     "import json, sys; from fitting.cli import main; code = main(sys.argv[1:]); "
