@@ -11,12 +11,12 @@ import msgspec
 from msgspec import inspect as types
 
 from fitting.scene.description import Scene, SceneError
-from fitting.scene.fields import expected, meaning, structs, unwrapped
+from fitting.scene.fields import expected, meaning, scene_type, structs, unwrapped
 
 
 def checked(plain: dict[str, Any]) -> Scene:
     """The scene that a TOML file holds. Raises `SceneError`, without the file's name."""
-    _table(plain, structs(types.type_info(Scene))[0], "")
+    _table(plain, scene_type(), "")
     try:
         return msgspec.convert(plain, Scene)
     except msgspec.ValidationError as error:

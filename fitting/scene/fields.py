@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from functools import cache
 from typing import Any
 
 import msgspec
@@ -35,8 +36,14 @@ class Section(Struct, frozen=True):
 def sections() -> list[Section]:
     """Every table that a scene file may have, the file itself first."""
     out: list[Section] = []
-    _describe(types.type_info(Scene), "", out)
+    _describe(scene_type(), "", out)
     return out
+
+
+@cache
+def scene_type() -> types.StructType:
+    """What msgspec knows of the definition of a scene."""
+    return structs(types.type_info(Scene))[0]
 
 
 def expected(kind: types.Type) -> str:

@@ -64,8 +64,9 @@ def channel_means(spectrum: Power, wavelengths_nm: np.ndarray) -> np.ndarray:
     """Power ``(c,)`` in channels at different wavelengths, in any order.
 
     The mean over the wavelengths up to both neighbours, with a weight that falls linearly
-    from 1 to 0, so that the lines of a lamp count wherever they fall. The first and last
-    channel reach as far out as in; a single one has the power at its wavelength.
+    from 1 to 0, so that the lines of a lamp count wherever they fall (with channels of 10
+    nm the chromaticity of FL11 is off by 0.0014). The first and last channel reach as far
+    out as in; a single one has the power at its wavelength.
     """
     order = np.argsort(wavelengths_nm)
     w = np.asarray(wavelengths_nm, dtype=np.float64)[order]
