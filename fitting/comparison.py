@@ -142,7 +142,7 @@ def choose(results: tuple[FitResult, ...]) -> tuple[int, str]:
     errors = np.asarray([h for h in held if h is not None])
     total = np.exp(errors.mean(axis=1))
     top = int(np.argmin(total))
-    near = [i for i in range(len(results)) if i == top or _as_good(errors[i], errors[top])]
+    near = [i for i in range(len(results)) if i == top or as_good(errors[i], errors[top])]
     best = min(near, key=lambda i: (n_free(results[i]), total[i]))
     name, number = results[best].model, n_free(results[best])
     if best == top:
@@ -167,7 +167,11 @@ def _held_out(result: FitResult) -> np.ndarray | None:
     return np.log(np.maximum(errors, 1e-300))
 
 
-def _as_good(errors: np.ndarray, best: np.ndarray) -> bool:
+def as_good(errors: np.ndarray, best: np.ndarray) -> bool:
+    """Whether logarithms of errors, angle by angle, are above others by chance only.
+
+    By less than one standard error of their mean difference.
+    """
     ratio = errors - best
     if ratio.size < 2:
         return bool(ratio.mean() <= 0)

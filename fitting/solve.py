@@ -180,14 +180,25 @@ class _PlainLoop(optx.AbstractAdjoint):
 
 
 @eqx.filter_jit
-def refine(problem: Problem, u0: Float[Array, " k"], x0: Float[Array, "c m"]) -> Solution:
-    """Run the solver from one start to the nearest minimum."""
+def refine(
+    problem: Problem,
+    u0: Float[Array, " k"],
+    x0: Float[Array, "c m"],
+    rtol: Float[Array, ""] | None = None,
+) -> Solution:
+    """Run the solver from one start to the nearest minimum.
+
+    ``rtol`` is that of `ArrowLevenbergMarquardt`, whose own is as tight as rounding allows.
+    """
+    solver = ArrowLevenbergMarquardt()
+    if rtol is not None:
+        solver = ArrowLevenbergMarquardt(rtol)  # pyright: ignore[reportArgumentType]
 
     def fn(y, args):
         return reduced.evaluate(args, y[0], y[1], jnp.asarray(False))
 
     out = optx.least_squares(
-        fn, ArrowLevenbergMarquardt(), (u0, x0), args=problem, max_steps=MAX_STEPS,
+        fn, solver, (u0, x0), args=problem, max_steps=MAX_STEPS,
         adjoint=_PlainLoop(), throw=False,
     )  # fmt: skip
     u, x = out.value

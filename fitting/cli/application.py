@@ -11,6 +11,8 @@ _COMMANDS = {
     "info": "Say what is in a file: geometry, coverage, values, quality.",
     "score": "Measure a fit result against a file, without fitting.",
     "reflectance": "Reflectances, transmittances and colours of a fit or of a file.",
+    "tradeoff": "Measure speed against accuracy: of models, and of choices inside one.",
+    "plot": "Draw figures of a fit: slices, lobes, residuals, albedo, spectra, ...",
     "convert": "Write measurements in another format.",
     "models": "List the models, or describe one in full.",
     "formats": "List the file formats, or describe one in full.",
@@ -49,6 +51,22 @@ Examples:
   brdf reflectance paint.fit.json --cone 45:0:5,0:0:10    two cones of your own
   brdf reflectance paint.fit.json -g 45/0 --reference before.fit.json
   brdf reflectance paint.astm -g 8/d                      the data, without a model
+""",
+    "tradeoff": """\
+Examples:
+  brdf tradeoff                                       the bundled sample, some minutes
+  brdf tradeoff paint.astm -o paint.tradeoff.json --figure paint.pdf
+  brdf tradeoff paint.astm -m lambert -m 'lambert + ggx' --inside none
+  brdf tradeoff paint.astm --quick --cost fit --error albedo
+""",
+    "plot": """\
+Examples:
+  brdf plot --list                            what there is
+  brdf plot paint.fit.json                    all that apply, as paint.FIGURE.png
+  brdf plot paint.fit.json slices beta -o figures --format svg
+  brdf plot paint.fit.json slices --channel '450 nm' -o slices.pdf
+  brdf plot paint.fit.json -o paint.pdf       all, a page each
+  brdf plot paint.fit.json --data moved/paint.astm
 """,
     "convert": "Example: brdf convert paint.astm paint.csv\n",
     "models": "Examples: brdf models; brdf models ggx\n",

@@ -1,0 +1,185 @@
+"""Error against cost of the candidates of `brdf tradeoff`, with the front marked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from fitting.quantities import percent
+from fitting.tradeoff.table import COST_WORDS, Candidate, ErrorAxis, Tradeoff
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_ERRORS: dict[ErrorAxis, str] = {
+    "held-out": "{objective} on angles of incidence not fitted, typical RMS",
+    "fitted": "{objective} on the rows fitted, RMS",
+    "albedo": "error of the albedo, RMS",
+    "image": "Delta E 2000 of the image, mean",
+}
+_TIMED = ("float32", "float64", "fit")
+# Size of type in points, and the mean width of a character over it.
+_LABEL, _CHARACTER = 7.5, 0.6
+
+
+class Point(NamedTuple):
+    """A candidate where it is drawn."""
+
+    cost: float
+    error: float
+    candidate: Candidate
+
+
+def draw(table: Tradeoff, axes: Axes | None = None) -> Figure:
+    """Draw the table into some axes, or into a new figure; returns the figure.
+
+    Both axes are logarithmic. Filled circles on a stepped line are the front, open squares
+    what is dominated; horizontal lines are the noise of the data by each account that they
+    allow. Measured times have bars from quartile to quartile.
+    """
+    from matplotlib.figure import Figure
+
+    from fitting.plots.style import styled
+
+    with styled():
+        if axes is None:
+            figure = Figure(figsize=(7.5, 5.0), layout="constrained")
+            axes = figure.add_subplot()
+        points = _points(table)
+        noise = _noise(axes, table)
+        _limits(axes, points, noise)
+        _candidates(axes, table, points)
+        axes.set_xlabel(COST_WORDS[table.cost_axis])
+        axes.set_ylabel(_ERRORS[table.error_axis].format(objective=table.objective))
+        about = table.sample or table.path.rpartition("/")[2]
+        axes.set_title(f"What accuracy costs: {about}" if about else "What accuracy costs")
+        found = axes.get_figure(root=True)
+        if not isinstance(found, Figure):
+            raise ValueError("the axes belong to no figure")
+        found.legend(loc="outside lower left", ncols=2)
+        # The layout tells where labels have room.
+        found.draw_without_rendering()
+        _labels(axes, points)
+    return found
+
+
+def _points(table: Tradeoff) -> list[Point]:
+    """What can be drawn, from cheap to dear."""
+    found = [
+        Point(c.cost(table.cost_axis), error, c)
+        for c in table.candidates
+        if (error := c.error(table.error_axis, table.objective)) is not None and error > 0
+    ]
+    return sorted(found, key=lambda p: (p.cost, -p.error))
+
+
+def _limits(axes: Axes, points: list[Point], noise: list[float]) -> None:
+    """Logarithmic axes with room for the labels at the right."""
+    from fitting.plots.log_axis import set_log_scale
+
+    cost = [p.cost for p in points if p.cost > 0] or [1.0]
+    error = [*(p.error for p in points), *noise] or [1.0]
+    wide = max(max(cost) / min(cost), 4.0)
+    high = max(max(error) / min(error), 4.0)
+    set_log_scale(axes.xaxis, min(cost) / wide**0.08, max(cost) * wide**0.3)
+    set_log_scale(axes.yaxis, min(error) / high**0.12, max(error) * high**0.15)
+
+
+def _candidates(axes: Axes, table: Tradeoff, points: list[Point]) -> None:
+    from fitting.plots.style import BLUE, GREY, VERMILLION
+
+    front = [p for p in points if p.candidate.on_front]
+    others = [p for p in points if not p.candidate.on_front]
+    if front:
+        axes.plot(
+            [p.cost for p in front], [p.error for p in front], drawstyle="steps-post",
+            color=BLUE, linewidth=1.2, zorder=2,
+        )  # fmt: skip
+    styles = (
+        (front, "o", BLUE, BLUE, "Pareto front"),
+        (others, "s", VERMILLION, "white", "dominated"),
+    )
+    for group, marker, colour, fill, label in styles:
+        if not group:
+            continue
+        axes.errorbar(
+            [p.cost for p in group], [p.error for p in group],
+            xerr=_bars([p.candidate for p in group], table), linestyle="none", marker=marker,
+            markersize=6.0, color=colour, markerfacecolor=fill, markeredgecolor=colour,
+            ecolor=GREY, elinewidth=0.8, label=label, zorder=3,
+        )  # fmt: skip
+
+
+def _labels(axes: Axes, points: list[Point]) -> None:
+    """Names beside the points, where they cover neither each other nor a point."""
+    from fitting.plots.style import INK
+
+    at = axes.transData.transform([(p.cost, p.error) for p in points])
+    points_per_pixel = 72.0 / axes.figure.dpi
+    taken = [(x - 4, y - 4, x + 4, y + 4) for x, y in at * points_per_pixel]
+    for (x, y), p in zip(at * points_per_pixel, points, strict=True):
+        name = p.candidate.model
+        width = _LABEL * _CHARACTER * len(name)
+        boxes = [
+            (x + dx - (width if dx < 0 else 0), y + dy, dx, dy)
+            for dy in (4.0, -11.0, 13.0, -20.0, 22.0, -29.0, 31.0, -38.0)
+            for dx in (6.0, -6.0)
+        ]
+        free = [b for b in boxes if not any(_overlap(b, width, t) for t in taken)]
+        left, bottom, dx, dy = (free or boxes)[0]
+        taken.append((left, bottom, left + width, bottom + _LABEL))
+        axes.annotate(
+            name, (p.cost, p.error), xytext=(dx, dy), textcoords="offset points",
+            ha="right" if dx < 0 else "left", fontsize=_LABEL, color=INK,
+            fontweight="bold" if p.candidate.on_front else "normal",
+        )  # fmt: skip
+
+
+def _overlap(
+    box: tuple[float, float, float, float],
+    width: float,
+    taken: tuple[float, float, float, float],
+) -> bool:
+    left, bottom = box[:2]
+    beside = left > taken[2] or left + width < taken[0]
+    above = bottom > taken[3] or bottom + _LABEL < taken[1]
+    return not (beside or above)
+
+
+def _bars(group: list[Candidate], table: Tradeoff) -> list[list[float]] | None:
+    """Distances to the quartiles of what is timed."""
+    if table.cost_axis not in _TIMED:
+        return None
+    below: list[float] = []
+    above: list[float] = []
+    for c in group:
+        times = c.evaluation.of(table.cost_axis)
+        spread = c.fit.seconds if times is None else times.batched_ns
+        below.append(spread.median - spread.low)
+        above.append(spread.high - spread.median)
+    return [below, above]
+
+
+def _noise(axes: Axes, table: Tradeoff) -> list[float]:
+    """Draw the noise of the data, where the error is in its unit; the heights."""
+    from fitting.plots.style import GREEN, ORANGE, PURPLE
+
+    heights: list[float] = []
+    if table.error_axis not in ("held-out", "fitted"):
+        return heights
+    colours = {"sigma": GREEN, "repeats": ORANGE, "reciprocity": PURPLE}
+    words = {
+        "sigma": "noise stated in the file",
+        "repeats": "noise of repeated rows",
+        "reciprocity": "noise, from exchanged directions",
+    }
+    for floor in table.noise_floors:
+        height = floor.typical if table.error_axis == "held-out" else floor.error
+        if height > 0:
+            heights.append(height)
+            axes.axhline(
+                height, color=colours[floor.source], linestyle=(0, (4, 2)), linewidth=1.2,
+                label=f"{words[floor.source]}: {percent(floor.relative)} of a value",
+                zorder=1,
+            )  # fmt: skip
+    return heights
