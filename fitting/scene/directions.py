@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -11,8 +11,7 @@ _COARSEST = math.radians(1.0)
 _FEWEST = 48
 _AT_ONCE = 200_000
 _STEPS = 60
-# Steps that all starts make before the best goes on alone.
-_STEPS_OF_ALL = 3
+_ROWS = 36
 
 # k patterns over directions x, y, z.
 Pattern = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
@@ -31,10 +30,10 @@ def cells(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Directions ``(n, 3)`` and solid angles ``(n,)`` that fill a cap, in pieces.
 
-    Cells of half of ``finest``, or 1 degree, in polar angle and azimuth; their solid angles
-    are exact.
+    Cells of ``finest`` or a whole part of it, at most 1 degree, in polar angle and azimuth;
+    their solid angles are exact. Those of a map are in line with its rows.
     """
-    size = min(0.5 * finest, _COARSEST)
+    size = finest / math.ceil(finest / _COARSEST)
     rings = max(math.ceil(half_angle / size - 1e-9), _FEWEST)
     edges = np.linspace(0.0, half_angle, rings + 1)
     theta = 0.5 * (edges[1:] + edges[:-1])
@@ -76,46 +75,61 @@ def irradiance(
     return np.asarray(total)
 
 
-def vector_irradiance(
+def fluxes(
     pattern: Pattern,
     axis: np.ndarray,
     half_angle: float,
     finest: float,
     weights: np.ndarray,
-    normals: np.ndarray,
-) -> np.ndarray:
-    """``int L w dw`` ``(m, 3)`` over each normal's side, L = ``weights (k,)`` @ pattern."""
-    if half_angle == 0:
-        value = float(weights @ pattern(*(np.array([a]) for a in axis))[:, 0])
-        return np.where((normals @ axis > 0)[:, None], value * axis, 0.0)
-    total = 0.0
-    for directions, solid in cells(axis, half_angle, finest):
-        weighed = (weights @ pattern(*directions.T)) * solid
-        seen = (normals @ directions.T > 0).astype(np.float64)
-        total = total + seen @ (weighed[:, None] * directions)
-    return np.asarray(total)
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Directions ``(n, 3)`` and the flux ``(n,)`` from each, in pieces.
 
-
-def brightest_normal(
-    vector: Callable[[np.ndarray], np.ndarray], starts: np.ndarray
-) -> np.ndarray:
-    """Unit normal ``(3,)`` whose irradiance is largest; ``starts (m, 3)`` need no length.
-
-    Irradiance is convex in the normal and homogeneous, and its gradient is the ``vector``
-    irradiance; going to the gradient's direction never makes it smaller.
+    Of radiance ``weights (k,)`` @ pattern times solid angle; of a direction, irradiance.
     """
-    normals = starts / np.linalg.norm(starts, axis=1, keepdims=True)
-    best = 0.0
-    for step in range(_STEPS):
-        gradient = vector(normals)
-        length = np.linalg.norm(gradient, axis=1)
-        lit = length > 0
-        if not lit.any():
-            return np.array([0.0, 0.0, 1.0])
-        normals = gradient[lit] / length[lit, None]
-        if step >= _STEPS_OF_ALL:
-            normals = normals[[int(np.argmax(length[lit]))]]
-            if length.max() <= best * (1 + 1e-9):
-                break
-        best = float(length.max())
-    return normals[0]
+    if half_angle == 0:
+        return [(axis[None], weights @ pattern(*(np.array([a]) for a in axis)))]
+    return [
+        (directions, (weights @ pattern(*directions.T)) * solid)
+        for directions, solid in cells(axis, half_angle, finest)
+    ]
+
+
+def brightest_normal(pieces: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Unit normal ``(3,)`` of the surface that gets the largest irradiance from `fluxes`.
+
+    Irradiance is convex in the normal and homogeneous, and its gradient is the flux vector
+    of the side that it faces; going to the gradient's direction never makes it smaller. The
+    start is the best of many, for the light gathered from about 5 degrees around.
+    """
+    gathered = sum(_gathered(*piece) for piece in pieces)
+    starts = np.concatenate([_spread(500), *(d[:1] for d, _ in pieces)])
+    coarse = np.maximum(starts @ np.asarray(gathered).T, 0.0).sum(axis=1)
+    normal, best = starts[int(np.argmax(coarse))], 0.0
+    for _ in range(_STEPS):
+        gradient = sum((flux * (d @ normal > 0)) @ d for d, flux in pieces)
+        length = float(np.linalg.norm(gradient))
+        if not length > 0:
+            return normal
+        normal = np.asarray(gradient) / length
+        if length <= best * (1 + 1e-10):
+            break
+        best = length
+    return normal
+
+
+def _gathered(directions: np.ndarray, flux: np.ndarray) -> np.ndarray:
+    """Flux vectors ``(m, 3)`` of cells of about 5 degrees."""
+    x, y, z = directions.T
+    row = np.minimum((np.arccos(np.clip(z, -1, 1)) * _ROWS / np.pi).astype(int), _ROWS - 1)
+    column = ((np.arctan2(y, x) / (2 * np.pi) + 0.5) * 2 * _ROWS).astype(int) % (2 * _ROWS)
+    cell = row * 2 * _ROWS + column
+    each = (np.bincount(cell, flux * a, 2 * _ROWS**2) for a in (x, y, z))
+    return np.stack(list(each), axis=1)
+
+
+def _spread(count: int) -> np.ndarray:
+    """Unit vectors ``(count, 3)`` all around, by the golden angle."""
+    k = np.arange(count) + 0.5
+    z, phi = 1 - 2 * k / count, math.pi * (1 + math.sqrt(5)) * k
+    sine = np.sqrt(1 - z * z)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), z], axis=1)

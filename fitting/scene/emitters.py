@@ -23,8 +23,8 @@ from fitting.scene.description import (
 from fitting.scene.directions import (
     Pattern,
     brightest_normal,
+    fluxes,
     irradiance,
-    vector_irradiance,
 )
 from fitting.scene.environment import interpolator, load_environment
 from fitting.scene.observer import brightness, observer
@@ -165,18 +165,8 @@ def _reference(light: Light, shape: _Shape, luminous: np.ndarray) -> np.ndarray:
     where = (shape.pattern, shape.axis, shape.half_angle, shape.finest)
     normal = shape.axis
     if isinstance(light, Map):
-
-        def vector(normals: np.ndarray) -> np.ndarray:
-            return vector_irradiance(*where, luminous, normals)
-
-        normal = brightest_normal(vector, starts())
+        normal = brightest_normal(fluxes(*where, luminous))
     return irradiance(*where, normal[None])[0]
-
-
-def starts() -> np.ndarray:
-    """Normals ``(14, 3)`` from which to look for the brightest one."""
-    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-    return np.concatenate([np.eye(3), -np.eye(3), np.array(corners, dtype=float)])
 
 
 def _ground(lights: Sequence[Emitter], reflectance: float) -> Emitter:

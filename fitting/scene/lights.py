@@ -148,7 +148,7 @@ class Map(_Light, frozen=True, kw_only=True, tag_field="kind", tag="map"):
     file: Annotated[str, Meta(description="Radiance HDR (.hdr, .pic) or OpenEXR (.exr).")]
     phi_deg: Annotated[Azimuth, Meta(description="Azimuth of the map's centre.")] = 0.0
     smallest_detail_deg: Annotated[
-        Annotated[float, Meta(ge=0.05, le=30, extra={"unit": "deg"})],
+        Annotated[float, Meta(ge=0.1, le=30, extra={"unit": "deg"})],
         Meta(
             description="Finer pixels are averaged up to about this size, their light "
             "kept; smaller details take longer."

@@ -11,8 +11,8 @@ from data_formats.measurement import Channel
 from fitting.colorimetry import FEWEST_WAVELENGTHS, srgb_to_xyz, tristimulus_weights
 from fitting.scene.bands import RGB, band_kind
 from fitting.scene.description import Scene, SceneError, Sphere
-from fitting.scene.directions import brightest_normal, vector_irradiance
-from fitting.scene.emitters import Emitter, emitter_irradiance, emitters, starts
+from fitting.scene.directions import brightest_normal, fluxes
+from fitting.scene.emitters import Emitter, emitter_irradiance, emitters
 from fitting.scene.observer import has_eye, observer
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -149,12 +149,8 @@ def _grey(efficiency: np.ndarray) -> np.ndarray:
 
 
 def _brightest(lights: Sequence[Emitter], luminous: np.ndarray) -> np.ndarray:
-    def vector(normals: np.ndarray) -> np.ndarray:
-        total = np.zeros_like(normals)
-        for e in lights:
-            where = (e.pattern, e.axis, e.half_angle, e.finest)
-            total += vector_irradiance(*where, e.spectrum @ luminous, normals)
-        return total
-
-    axes = np.stack([e.axis for e in lights])
-    return brightest_normal(vector, np.concatenate([axes, starts()]))
+    pieces = []
+    for e in lights:
+        where = (e.pattern, e.axis, e.half_angle, e.finest)
+        pieces += fluxes(*where, e.spectrum @ luminous)
+    return brightest_normal(pieces)
