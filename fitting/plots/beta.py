@@ -147,10 +147,12 @@ def _curve(
 
 def _mark_peak(axes: Axes, value: np.ndarray, left: float, colour: str) -> int:
     """Values in the very direction of the peak, at the left edge: their distance is 0."""
-    axes.plot(
-        np.full(value.size, left), value, linestyle="none", marker="<", markersize=4.5,
-        color=colour, clip_on=False, zorder=5, label="_peak",
-    )  # fmt: skip
+    # An empty line outside of the axes would still take part in the layout.
+    if value.size:
+        axes.plot(
+            np.full(value.size, left), value, linestyle="none", marker="<", markersize=4.5,
+            color=colour, clip_on=False, zorder=5, label="_peak",
+        )  # fmt: skip
     return value.size
 
 

@@ -27,7 +27,8 @@ def new_figure(
     """A figure of a size in inches; its title names model and file. See `finish`."""
     figure = Figure(figsize=size, layout="constrained" if constrained else None)
     about = f"{subject.result.model}  |  {subject.source}"
-    lines = [heading, *textwrap.wrap(about, int(size[0] * _TITLE))]
+    wide = int(size[0] * _TITLE)
+    lines = [*textwrap.wrap(heading, wide), *textwrap.wrap(about, wide)]
     figure.suptitle("\n".join(lines), x=0.01, ha="left")
     return figure
 
@@ -49,8 +50,9 @@ def finish(
     if handles:
         longest = max(_length(str(h.get_label())) for h in handles)
         columns = max(min(int(width * _LEGEND / (longest + 5)), len(handles), 8), 1)
+        ordered = _row_by_row(handles, columns)
         figure.legend(
-            handles=list(handles), ncols=columns, loc="lower left", borderpad=0.0,
+            handles=ordered, ncols=columns, loc="lower left", borderpad=0.0,
             bbox_to_anchor=(0.01, used / height, 0.98, 0.01), borderaxespad=0.5,
         )  # fmt: skip
         rows = math.ceil(len(handles) / columns)
@@ -59,6 +61,11 @@ def finish(
     if isinstance(engine, ConstrainedLayoutEngine):
         engine.set(rect=(0.0, used / height, 1.0, 1.0 - used / height))
     return figure
+
+
+def _row_by_row(handles: Sequence[Artist], columns: int) -> list[Artist]:
+    """In the order in which columns, filled one after another, read row by row."""
+    return [h for c in range(columns) for h in handles[c::columns]]
 
 
 def _footnote(subject: Subject, notes: Sequence[str], wide: int) -> list[str]:

@@ -27,6 +27,8 @@ def figure(subject: Subject) -> Figure:
     names = found.names
     if not names:
         raise NoFigure("no parameter was free")
+    if len(names) == 1:
+        raise NoFigure(f"only {names[0]} was free")
     several = len(found.matrices) > 1
     shown = subject.chosen if several else [0]
     size = max(_CELL * len(names), 1.6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,12 @@ from fitting.plots.subject import Subject
 
 def draw_points(
     axes: Axes, subject: Subject, rows: np.ndarray, x: np.ndarray, channel: int,
-    style: dict[str, Any],
+    style: dict[str, Any], height: Callable[[np.ndarray], np.ndarray] = np.asarray,
 ) -> None:  # fmt: skip
     """Values of rows of the data against ``x``; hollow where the fit did not use them.
 
-    Bars are two standard uncertainties to both sides, where the data have them.
+    Bars are two standard uncertainties to both sides, where the data have them; ``height``
+    makes what is drawn of a value.
     """
     m = subject.data
     y, used = m.value[rows, channel], subject.used[rows]
@@ -26,14 +28,15 @@ def draw_points(
         if not some.any():
             continue
         if m.sigma is not None:
-            axes.errorbar(
-                x[some], y[some], yerr=2.0 * m.sigma[rows[some], channel], fmt="none",
-                ecolor=style["color"], elinewidth=0.7, zorder=2,
-                rasterized=style["rasterized"],
+            bar = 2.0 * m.sigma[rows[some], channel]
+            ends = height(y[some] - bar), height(y[some] + bar)
+            axes.vlines(
+                x[some], ends[0], ends[1], color=style["color"], lw=0.7, zorder=2,
+                rasterized=style["rasterized"], label="_sigma",
             )  # fmt: skip
         own: dict[str, Any] = style | {"markerfacecolor": face}
         label = "measured" if some is used else "not fitted"
-        axes.plot(x[some], y[some], zorder=3, label=label, **own)
+        axes.plot(x[some], height(y[some]), zorder=3, label=label, **own)
 
 
 def kinds_of_marks(subject: Subject, *, dotted: bool = True) -> list[Line2D]:

@@ -6,7 +6,6 @@ The normal points up; the distance from the middle is the value in that directio
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -124,8 +123,7 @@ def _diagrams(
         draw_points(linear, subject, rows, at, c, style)
         value = subject.data.value[rows, c]
         hidden += int(np.sum(value < low))
-        own: dict[str, Any] = style | {"label": "measured"}
-        log.plot(at, _decades(value, low), zorder=3, **own)
+        draw_points(log, subject, rows, at, c, style, lambda v: _decades(v, low))
     top = max(float(y.max(initial=0.0)), float(f.max(initial=0.0))) or 1.0
     linear.set_rlim(0.0, 1.05 * top)
     linear.yaxis.set_major_locator(MaxNLocator(4, prune="lower"))

@@ -1,6 +1,4 @@
-"""Coefficients over the spectrum, with their error bands, and whatever else has one value
-per channel.
-"""
+"""Coefficients over the spectrum, and other parameters of each channel, with error bands."""
 
 from __future__ import annotations
 
