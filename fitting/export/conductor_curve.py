@@ -14,13 +14,10 @@ from fitting.models import fresnel
 from fitting.models.microfacet import Options
 
 _NODES = 48
-# log of eta, k and scale: a transparent rim and a metal nearly the same at all angles; and
-# two transparent ones.
-_STARTS = (
-    (np.log(1.2), np.log(1e-3), np.log(2.0), np.log(6.0)),
-    (np.log(1.1), np.log(1e-3), np.log(1.5), np.log(1e-3)),
-)
-_ETA, _K = (np.log(0.05), np.log(10.0)), (np.log(1e-4), np.log(50.0))
+# log of eta and k: a transparent rim with a metal nearly the same at all angles, and two
+# transparent ones.
+_STARTS = ((1.2, 1e-3, 2.0, 6.0), (1.1, 1e-3, 1.5, 1e-3))
+_ETA, _K = (0.05, 10.0), (1e-4, 50.0)
 _LEAST = 1e-7
 
 
@@ -49,47 +46,77 @@ def two_conductors(curve: np.ndarray, cos_d: np.ndarray) -> tuple[Values, Values
     facets are seen in projection. Two of them follow a rising curve of Schlick's within 2
     %; one is 20 % off. A curve that falls towards grazing is followed by none.
     """
-    found = [_two(curve[:, c], cos_d) for c in range(curve.shape[1])]
-    p = np.array(found)
-    return tuple(  # pyright: ignore[reportReturnType]
-        {"eta": p[:, 3 * j], "k": p[:, 3 * j + 1], "scale": p[:, 3 * j + 2]}
+    each = [_together(curve[:, [c]], cos_d, np.inf) for c in range(curve.shape[1])]
+    first, second = (
+        {n: np.concatenate([np.atleast_1d(e[j][n]) for e in each]) for n in each[0][j]}
         for j in range(2)
     )
+    return first, second
 
 
-def _two(curve: np.ndarray, cos_d: np.ndarray) -> np.ndarray:
+def sharing_scales(
+    curve: np.ndarray, cos_d: np.ndarray, most: float
+) -> tuple[Values, Values]:
+    """The same with ``eta, k (c,)`` and one scale for all channels, of a sum up to
+    ``most``, above which the curve cannot be followed."""
+    return _together(curve, cos_d, most)
+
+
+def _together(curve: np.ndarray, cos_d: np.ndarray, most: float) -> tuple[Values, Values]:
+    channels = curve.shape[1]
+    nothing = {"eta": np.full(channels, 1.5), "k": np.zeros(channels)}
     top = float(np.max(curve))
     if not top > _LEAST:
-        return np.array([1.5, 0.0, 0.0, 1.5, 0.0, 0.0])
-    weight = np.sqrt(cos_d) / np.maximum(curve, 0.02 * top)
+        return tuple({**nothing, "scale": np.asarray(0.0)} for _ in range(2))  # type: ignore
+    least = 0.02 * np.maximum(curve.max(axis=0), _LEAST)
+    weight = np.sqrt(cos_d)[:, None] / np.maximum(curve, least)
     value, slope = _compiled()
-    low = [_ETA[0], _K[0], -30.0] * 2
-    high = [_ETA[1], _K[1], np.log(1e3)] * 2
+    limit = np.log(min(most, 1e3))
+    bounds = _bounds(channels, limit)
     best = None
     with jax.enable_x64(True):
-        for first_eta, first_k, second_eta, second_k in _STARTS:
-            # Scales that share the curve at grazing and at the normal.
-            rim, rest = max(curve[0], _LEAST), max(curve[-1], _LEAST)
-            start = [first_eta, first_k, np.log(rim), second_eta, second_k, np.log(rest)]
+        for start in _STARTS:
+            rim = float(np.clip(np.log(np.max(curve)), bounds[0][0], limit - 1e-3))
+            own = np.repeat(np.log(start), channels)
+            # The metal's share is what is left at the normal.
+            share = np.clip(np.max(curve[-1]) / top, 0.02, 0.98)
             found = least_squares(
-                lambda p: weight * (np.asarray(value(p, cos_d)) - curve),
-                start,
-                lambda p: weight[:, None] * np.asarray(slope(p, cos_d)),  # pyright: ignore
-                bounds=(low, high),
+                lambda p: (weight * (np.asarray(value(p, cos_d)) - curve)).ravel(),
+                np.clip([rim, np.log((1 - share) / share), *own], *bounds),
+                lambda p: (  # pyright: ignore[reportArgumentType]
+                    weight[..., None] * np.asarray(slope(p, cos_d))
+                ).reshape(-1, p.size),
+                bounds=bounds,
             )
             if best is None or found.cost < best.cost:
                 best = found
     assert best is not None
-    return np.exp(best.x)
+    total, split = np.exp(best.x[0]), 1.0 / (1.0 + np.exp(-best.x[1]))
+    eta1, k1, eta2, k2 = np.exp(best.x[2:]).reshape(4, channels)
+    return (
+        {"eta": eta1, "k": k1, "scale": np.asarray(total * split)},
+        {"eta": eta2, "k": k2, "scale": np.asarray(total * (1.0 - split))},
+    )
+
+
+def _bounds(channels: int, limit: float) -> tuple[np.ndarray, np.ndarray]:
+    low = [-30.0, -20.0, *np.repeat(np.log([_ETA[0], _K[0]] * 2), channels)]
+    high = [limit, 20.0, *np.repeat(np.log([_ETA[1], _K[1]] * 2), channels)]
+    return np.array(low), np.array(high)
 
 
 @functools.cache
 def _compiled():
-    """The sum of two conductors by the logarithms of their parameters, and its Jacobian."""
+    """``(n, c)`` of two conductors, and its Jacobian.
+
+    By the logarithm of the sum of their scales, the logit of the first one's share, and
+    the logarithms of ``eta, k`` of the first and of the second in all channels.
+    """
 
     def value(p, cos_d):
-        q = jnp.exp(p)
-        first = q[2] * fresnel.conductor(cos_d, q[0], q[1])
-        return first + q[5] * fresnel.conductor(cos_d, q[3], q[4])
+        eta1, k1, eta2, k2 = jnp.exp(p[2:]).reshape(4, -1)
+        share, c = jax.nn.sigmoid(p[1]), cos_d[:, None]
+        first = share * fresnel.conductor(c, eta1, k1)
+        return jnp.exp(p[0]) * (first + (1.0 - share) * fresnel.conductor(c, eta2, k2))
 
     return jax.jit(value), jax.jit(jax.jacfwd(value))

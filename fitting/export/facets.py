@@ -32,7 +32,7 @@ class Facets:
     @property
     def exact(self) -> bool:
         """Whether its Fresnel term is that of a conductor or a dielectric."""
-        return self._options.fresnel in ("conductor", "dielectric")
+        return self.options.fresnel in ("conductor", "dielectric")
 
     @functools.cached_property
     def conductors(self) -> list[Values]:
@@ -42,21 +42,20 @@ class Facets:
         """
         own = self.part.values
         if self.exact:
-            channels = own["scale"].shape
-            k = own.get("k", np.zeros(channels))
+            k = own.get("k", np.zeros(own["scale"].shape))
             found = [{"eta": own["eta"], "k": k, "scale": own["scale"]}]
         else:
             cosines = conductor_curve.nodes()
-            curve = conductor_curve.reflectance(self._options, own, cosines)
+            curve = conductor_curve.reflectance(self.options, own, cosines)
             found = list(conductor_curve.two_conductors(curve, cosines))
-        top = max(float(np.max(c["scale"])) for c in found)
         channels = found[0]["scale"].shape
+        top = max(float(np.max(c["scale"])) for c in found)
         wide = [{n: np.broadcast_to(v, channels) for n, v in c.items()} for c in found]
         kept = [c for c in wide if np.max(c["scale"]) > _NEGLIGIBLE * top]
         return kept or wide[:1]
 
     @property
-    def _options(self) -> Options:
+    def options(self) -> Options:
         return cast(Options, self.part.lobe)
 
 

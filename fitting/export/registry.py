@@ -14,7 +14,7 @@ from fitting.expression import ModelError
 if TYPE_CHECKING:
     from fitting.export.target import Target
 
-TARGETS = ("mitsuba",)
+TARGETS = ("mitsuba", "pbrt")
 
 
 @dataclass(frozen=True)

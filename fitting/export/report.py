@@ -47,8 +47,8 @@ class Residual(msgspec.Struct, frozen=True):
         return (
             f"relative RMS {self.relative_rms:.2g} (cosine-weighted, up to 85 deg); "
             f"largest deviation {self.largest:.3g} per sr ({self.exported:.4g} for "
-            f"{self.fitted:.4g}, {self.channel}) at theta_i {self.theta_i_deg:.1f}, theta_r "
-            f"{self.theta_r_deg:.1f}, phi_r - phi_i {across:.1f} deg"
+            f"{self.fitted:.4g}, {self.channel}) at theta_i {self.theta_i_deg:.1f}, "
+            f"theta_r {self.theta_r_deg:.1f}, phi_r - phi_i {across:.1f} deg"
         )
 
 

@@ -20,9 +20,8 @@ from fitting.result import (
 )
 
 RGB = tuple(Channel(n, None) for n in "RGB")
-SPECTRAL = tuple(
-    Channel(f"{w:g} nm", w) for w in (400.0, 450.0, 500.0, 550.0, 600.0, 700.0)
-)
+WAVELENGTHS = (400.0, 450.0, 500.0, 550.0, 600.0, 700.0)
+SPECTRAL = tuple(Channel(f"{w:g} nm", w) for w in WAVELENGTHS)
 
 
 def result_of(expression: str, channels=RGB, **values) -> FitResult:
