@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import RBFInterpolator, RegularGridInterpolator
 from scipy.ndimage import distance_transform_edt
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from fitting.geometry import Geometry
 from fitting.rows import Rows
@@ -24,9 +24,10 @@ from fitting.scene.chart import Chart, HalfAngles, from_half_angles, half_angles
 from fitting.solid_angle import incidence_labels
 
 _NEIGHBOURS = {True: 64, False: 96}
-_SMOOTHINGS = (1e-2, 1.0, 1e2, 1e4)
+_SMOOTHINGS = (1e-2, 1.0, 1e1, 1e2, 1e3)
 _FIRST_SMOOTHING = 1.0
 _HELD_OUT = 400
+_NEARBY, _OVERSHOOT = 16, 0.25
 _MAD_TO_SIGMA = 1.4826
 _SCATTERED, _SCATTERED_RATIO = 40, 4.0
 _FAR = 1.5
@@ -47,17 +48,17 @@ class Reference:
     relative_noise: np.ndarray
     floor: np.ndarray
     _table: RegularGridInterpolator
+    _noise_table: RegularGridInterpolator
     _scale: np.ndarray
-    _tree: cKDTree
+    _tree: KDTree
     _far: float
     _steepest: float
 
     def value(self, g: Geometry, *, noisy: bool = False) -> np.ndarray:
         """BRDF ``(n, c)``, 1/sr. ``noisy``: as another measurement of the same surface with
         the same noise would have it, to see what the noise does to an image."""
-        table = self._table(_coordinates(half_angles(g), isotropic=self.chart.isotropic))
-        c = self._scale.size
-        v = table[:, :c] + table[:, c:] if noisy else table[:, :c]
+        at = _coordinates(half_angles(g), isotropic=self.chart.isotropic)
+        v = self._table(at) + self._noise_table(at) if noisy else self._table(at)
         return self._scale * np.sinh(v)
 
     def supported(self, g: Geometry) -> np.ndarray:
@@ -87,20 +88,18 @@ def interpolate(rows: Rows, *, isotropic: bool, seed: int = 0) -> Reference:
     kept = np.setdiff1d(np.arange(len(points)), held)
     neighbours = min(_NEIGHBOURS[isotropic], len(kept))
 
-    def local(among: np.ndarray, columns: np.ndarray, smoothing: float) -> RBFInterpolator:
-        where, mean = _without_repeats(points[among], columns[among])
-        return RBFInterpolator(
-            where, mean, neighbors=min(neighbours, len(where)), smoothing=smoothing,
-            kernel="cubic", degree=1,
-        )  # fmt: skip
+    def local(among: np.ndarray, columns: np.ndarray, smoothing: float) -> _Local:
+        return _Local(points[among], columns[among], neighbours, smoothing)
 
     first = local(kept, np.arcsinh(value / scale), _FIRST_SMOOTHING)(points[held])
     relative, floor = _noise(value[held], scale * np.sinh(first))
     typical = np.median(np.abs(value), axis=0)
     scale = np.clip(floor / np.maximum(relative, 1e-3), 1e-2 * typical, typical) + 1e-300
     columns = np.arcsinh(value / scale)
+    # By the light that they carry: at grazing angles values rise beyond all smoothness.
+    light = (rows.geometry.cos_i * rows.geometry.cos_o)[held, None]
     misses = [
-        np.sqrt(np.mean((local(kept, columns, s)(points[held]) - columns[held]) ** 2))
+        np.mean(light * np.abs(local(kept, columns, s)(points[held]) - columns[held]))
         for s in _SMOOTHINGS
     ]
     best = int(np.argmin(misses))
@@ -109,12 +108,17 @@ def interpolate(rows: Rows, *, isotropic: bool, seed: int = 0) -> Reference:
     noise = spread * rng.standard_normal(columns.shape)
     rbf = local(np.arange(len(points)), np.hstack([columns, noise]), _SMOOTHINGS[best])
     relative, floor = _noise(value[held], scale * np.sinh(columns[held] + residual))
-    tree = cKDTree(points)
+    axes, table = _tabulated(rbf, chart)
+    values, of_noise = (
+        RegularGridInterpolator(axes, t, method="linear")
+        for t in np.split(table, 2, axis=-1)
+    )
+    tree = KDTree(points)
     distance = tree.query(points, k=2)[0][:, 1]
     steepest = np.arccos(np.minimum(rows.geometry.cos_i, rows.geometry.cos_o)).max()
     return Reference(
         chart=chart, smoothing=_SMOOTHINGS[best], relative_noise=relative, floor=floor,
-        _table=_tabulated(rbf, chart), _scale=scale, _tree=tree,
+        _table=values, _noise_table=of_noise, _scale=scale, _tree=tree,
         _far=_FAR * max(1.0, float(np.percentile(distance, 95))), _steepest=float(steepest),
     )  # fmt: skip
 
@@ -161,15 +165,52 @@ def _noise(value: np.ndarray, smooth: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return relative, floor
 
 
-def _without_repeats(
-    points: np.ndarray, columns: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Each point once, with the mean of its values."""
-    where, index = np.unique(np.round(points, 6), axis=0, return_inverse=True)
-    index = index.reshape(-1)
-    total = np.zeros((len(where), columns.shape[1]))
-    np.add.at(total, index, columns)
-    return where, total / np.bincount(index)[:, None]
+class _Local:
+    """Radial basis functions among the nearest points, cubic where these span the space.
+
+    Where all near points are in a plane (a single incidence) nothing can be said of slopes
+    across it, and linear ones serve, which ask for none. Points closer than a tenth of a
+    step are one, with their mean.
+    """
+
+    def __init__(
+        self, points: np.ndarray, columns: np.ndarray, neighbours: int, smoothing: float
+    ):
+        _, first, index = np.unique(
+            np.round(points, 1), axis=0, return_index=True, return_inverse=True
+        )
+        index = index.reshape(-1)
+        total = np.zeros((len(first), columns.shape[1]))
+        np.add.at(total, index, columns)
+        mean = total / np.bincount(index)[:, None]
+        near = min(neighbours, len(first))
+        where = points[first]
+        self._tree, self._mean = KDTree(where), mean
+        self._linear = RBFInterpolator(
+            where, mean, neighbors=near, smoothing=smoothing, kernel="linear", degree=0
+        )
+        self._cubic = None
+        if len(first) > points.shape[1]:
+            self._cubic = RBFInterpolator(
+                where, mean, neighbors=near, smoothing=smoothing, kernel="cubic", degree=1
+            )
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Values ``(n, c)``, which leave the range of those nearby by a quarter of it at
+        most: beyond the data nothing grows without bounds."""
+        count = min(_NEARBY, len(self._mean))
+        near = self._mean[self._tree.query(points, k=range(1, count + 1))[1]]
+        low, high = near.min(axis=1), near.max(axis=1)
+        room = _OVERSHOOT * (high - low)
+        return np.clip(self._between(points), low - room, high + room)
+
+    def _between(self, points: np.ndarray) -> np.ndarray:
+        if self._cubic is not None:
+            try:
+                return self._cubic(points)
+            except np.linalg.LinAlgError:
+                self._cubic = None
+        return self._linear(points)
 
 
 def _axes(isotropic: bool) -> list[np.ndarray]:
@@ -192,7 +233,7 @@ def _coordinates(a: HalfAngles, *, isotropic: bool) -> np.ndarray:
     return np.stack([t, a.phi_h, theta_d, light], axis=-1)
 
 
-def _tabulated(rbf: RBFInterpolator, chart: Chart) -> RegularGridInterpolator:
+def _tabulated(rbf: _Local, chart: Chart) -> tuple[list[np.ndarray], np.ndarray]:
     """The interpolant on a grid, which is evaluated a thousand times faster."""
     axes = _axes(chart.isotropic)
     mesh = np.meshgrid(*axes, indexing="ij")
@@ -212,4 +253,4 @@ def _tabulated(rbf: RBFInterpolator, chart: Chart) -> RegularGridInterpolator:
     table = np.zeros((*shape, found.shape[1]))
     table[seen] = found
     nearest = distance_transform_edt(~seen, return_distances=False, return_indices=True)
-    return RegularGridInterpolator(axes, table[tuple(nearest)], method="linear")
+    return axes, table[tuple(np.asarray(nearest))]
