@@ -14,7 +14,7 @@ from fitting.expression import ModelError
 if TYPE_CHECKING:
     from fitting.export.target import Target
 
-TARGETS = ("mitsuba", "pbrt")
+TARGETS = ("mitsuba", "pbrt", "materialx", "openpbr")
 
 
 @dataclass(frozen=True)
