@@ -8,17 +8,20 @@ from rich.console import Console
 
 from fitting.cli.flags import Flags
 from fitting.cli.terminal import bullet, heading, table
-from fitting.quantities import channel_span, number, percent, with_uncertainty
+from fitting.quantities import channel_span, number, percent
 from fitting.tradeoff.fit_cost import MEMORY
 from fitting.tradeoff.table import COST_WORDS, Candidate, ErrorAxis, Tradeoff
 from fitting.tradeoff.timing import Spread
 from fitting.tradeoff.trade import Trade
 
+# What is computed once per call is worth a word if it costs as much as so many pairs.
+_MANY = 100
+
 _ERROR_WORDS: dict[ErrorAxis, str] = {
     "held-out": "held-out {objective}: typical RMS at an angle of incidence not fitted",
     "fitted": "{objective}: RMS over the rows that were fitted",
     "albedo": "albedo: RMS difference of the sums over the rows, fit and data",
-    "image": "mean Delta E 2000 of the image",
+    "image": "mean difference of the image from that of the data",
 }
 
 
@@ -54,9 +57,17 @@ def show(out: Console, found: Tradeoff, flags: Flags) -> None:
 
 def _evaluation(out: Console, found: Tradeoff) -> None:
     rows = table(
-        "", "model", "operations", "flops", "transc.", "f32, ns", "f64, ns", "one, us",
-        "once", left=2,
-    )  # fmt: skip
+        "",
+        "model",
+        "operations",
+        "flops",
+        "transc.",
+        "f32, ns",
+        "f64, ns",
+        "one, us",
+        left=2,
+    )
+    rows.columns[1].no_wrap = True
     for c in _by_cost(found):
         e = c.evaluation
         single, double = e.of("float32"), e.of("float64")
@@ -69,16 +80,22 @@ def _evaluation(out: Console, found: Tradeoff) -> None:
             "-" if single is None else _spread(single.batched_ns),
             "-" if double is None else _spread(double.batched_ns),
             "-" if single is None else _spread(single.single_ns.scaled(1e-3)),
-            f"{e.count.flops_once:.2g}",
             style="bold" if c.on_front else "",
         )
     out.print(rows)
     out.print(
-        "\nper pair of directions in all channels, many at once; operations: flops + 30 "
-        "transcendentals; one: a single evaluation in float32, with the dispatch of the "
-        "call; once: flops per call, whatever the number of pairs",
+        "\nper pair of directions in all channels, many at once; ops: operations, flops "
+        "+ 30 transcendentals; one: a single evaluation in float32, with the dispatch of "
+        "the call",
         style="dim",
     )
+    for c in _by_cost(found):
+        if c.evaluation.count.flops_once > c.evaluation.count.flops * _MANY:
+            bullet(
+                out,
+                f"{c.model} makes tables once per call, whatever the number of pairs: "
+                f"{c.evaluation.count.flops_once:.2g} flops",
+            )
 
 
 def _fitting(out: Console, found: Tradeoff) -> None:
@@ -86,6 +103,7 @@ def _fitting(out: Console, found: Tradeoff) -> None:
     rows = table(
         "", "model", "parameters", "s", "steps", "starts", "MB", "first, s", left=2
     )
+    rows.columns[1].no_wrap = True
     for c in _by_cost(found):
         f = c.fit
         rows.add_row(
@@ -130,9 +148,19 @@ def _errors(out: Console, found: Tradeoff) -> None:
     out.print(rows)
     out.print(
         "\nheld-out: typical RMS at an angle of incidence that was not fitted; albedo: RMS "
-        "difference from the data's over angles and channels; image, 95 %: Delta E 2000, "
-        "mean and 95th percentile",
+        "difference from the data's over angles and channels; image, 95 %: "
+        + _image_words(found),
         style="dim",
+    )
+
+
+def _image_words(found: Tradeoff) -> str:
+    images = [c.errors.image for c in found.candidates if c.errors.image is not None]
+    if not images:
+        return "no image was made"
+    return (
+        f"{images[0].measure} in the scene {images[0].scene}, mean and 95th percentile, "
+        f"without the noise of the data, which makes {images[0].noise:.2g}"
     )
 
 
@@ -154,8 +182,8 @@ def _front(out: Console, found: Tradeoff) -> None:
     for floor in found.noise_floors:
         bullet(
             out,
-            f"noise of the data, by {floor.sentence}: {percent(floor.relative)} of a "
-            f"value, which makes a typical {found.objective} of {number(floor.typical, 3)}",
+            f"noise of the data: {percent(floor.relative)} of a value, which makes a "
+            f"typical {found.objective} of {number(floor.typical, 3)}; by {floor.sentence}",
         )
 
 
@@ -209,8 +237,13 @@ def _by_cost(found: Tradeoff) -> list[Candidate]:
 
 
 def _spread(s: Spread) -> str:
-    """A median and half of the distance of the quartiles."""
-    return with_uncertainty(s.median, 0.5 * (s.high - s.low))
+    """A median and half of the distance of the quartiles, to its first digit."""
+    half = 0.5 * (s.high - s.low)
+    if not half > 0:
+        return number(s.median, 3)
+    digits = -int(f"{half:.0e}".partition("e")[2])
+    shown = max(digits, 0)
+    return f"{round(s.median, digits):.{shown}f} ± {round(half, digits):.{shown}f}"
 
 
 def _duration(s: Spread) -> str:

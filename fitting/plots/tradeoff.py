@@ -15,7 +15,7 @@ _ERRORS: dict[ErrorAxis, str] = {
     "held-out": "{objective} on angles of incidence not fitted, typical RMS",
     "fitted": "{objective} on the rows fitted, RMS",
     "albedo": "error of the albedo, RMS",
-    "image": "Delta E 2000 of the image, mean",
+    "image": "difference of the image from the data's, mean",
 }
 _TIMED = ("float32", "float64", "fit")
 # Size of type in points, and the mean width of a character over it.
@@ -81,7 +81,7 @@ def _limits(axes: Axes, points: list[Point], noise: list[float]) -> None:
     error = [*(p.error for p in points), *noise] or [1.0]
     wide = max(max(cost) / min(cost), 4.0)
     high = max(max(error) / min(error), 4.0)
-    set_log_scale(axes.xaxis, min(cost) / wide**0.08, max(cost) * wide**0.3)
+    set_log_scale(axes.xaxis, min(cost) / wide**0.08, max(cost) * min(wide**0.3, 6.0))
     set_log_scale(axes.yaxis, min(error) / high**0.12, max(error) * high**0.15)
 
 
@@ -104,8 +104,9 @@ def _candidates(axes: Axes, table: Tradeoff, points: list[Point]) -> None:
             continue
         axes.errorbar(
             [p.cost for p in group], [p.error for p in group],
-            xerr=_bars([p.candidate for p in group], table), linestyle="none", marker=marker,
-            markersize=6.0, color=colour, markerfacecolor=fill, markeredgecolor=colour,
+            xerr=_bars([p.candidate for p in group], table), linestyle="none",
+            marker=marker, markersize=6.0, color=colour, markerfacecolor=fill,
+            markeredgecolor=colour,
             ecolor=GREY, elinewidth=0.8, label=label, zorder=3,
         )  # fmt: skip
 
@@ -165,6 +166,13 @@ def _noise(axes: Axes, table: Tradeoff) -> list[float]:
     from fitting.plots.style import GREEN, ORANGE, PURPLE
 
     heights: list[float] = []
+    images = [c.errors.image for c in table.candidates if c.errors.image is not None]
+    if table.error_axis == "image" and images and images[0].noise > 0:
+        heights.append(images[0].noise)
+        axes.axhline(
+            heights[0], color=ORANGE, linestyle=(0, (4, 2)), linewidth=1.2, zorder=1,
+            label="noise of the data in the image",
+        )  # fmt: skip
     if table.error_axis not in ("held-out", "fitted"):
         return heights
     colours = {"sigma": GREEN, "repeats": ORANGE, "reciprocity": PURPLE}

@@ -6,6 +6,7 @@ import msgspec
 
 from data_formats import Measurement
 from fitting.result import AngleError, FitResult, Scores
+from fitting.scene.stage import Stage
 from fitting.tradeoff.albedo_error import AlbedoError, albedo_error
 from fitting.tradeoff.rendered_error import RenderedError, rendered_error
 
@@ -28,8 +29,8 @@ class Errors(msgspec.Struct, frozen=True):
     image: RenderedError | None
 
 
-def errors_of(measurement: Measurement, result: FitResult, scene: str | None) -> Errors:
-    """Measure all errors of a fit, that in an image only if there is a scene."""
+def errors_of(measurement: Measurement, result: FitResult, stage: Stage | None) -> Errors:
+    """Measure all errors of a fit, that in an image only if there is a stage."""
     validation = result.cross_validation
     return Errors(
         fitted=result.scores,
@@ -37,7 +38,7 @@ def errors_of(measurement: Measurement, result: FitResult, scene: str | None) ->
         typical=None if validation is None else validation.typical,
         by_angle=[] if validation is None else validation.by_angle,
         albedo=albedo_error(measurement, result),
-        image=None if scene is None else rendered_error(measurement, result, scene),
+        image=None if stage is None else rendered_error(stage, result),
     )
 
 

@@ -130,8 +130,9 @@ def _exchanged(m: Measurement, rows: Rows) -> tuple[np.ndarray, str, str] | None
     share = of_channel / (math.sqrt(2.0) * _MEDIAN_OF_NORMAL)
     value = np.abs(np.where(rows.valid, rows.value, 0.0))
     said = (
-        f"source and detector exchanged change a value by {percent(np.median(of_channel))} "
-        f"(median of {count(pairs, 'pair')} per channel, interpolated)"
+        f"exchanging source and detector, which changes a value by "
+        f"{percent(np.median(of_channel))} (median of {count(pairs, 'pair')} per channel, "
+        "interpolated)"
     )
     return share * value, "reciprocity", said
 

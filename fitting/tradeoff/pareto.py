@@ -47,7 +47,8 @@ def domination(
     name: str, other: str, own: tuple[float, float], better: tuple[float, float]
 ) -> str:
     """The sentence on a dominated candidate, with ``(cost, error)`` of both."""
-    cost, error = better[0] / own[0], better[1] / own[1]
+    cost = better[0] / own[0]
+    error = better[1] / own[1] if own[1] > 0 else 1.0
     costs = f"costs {cost:.2g} times as much" if cost < 0.995 else "costs the same"
     makes = f"has {error:.2g} times its error" if error < 0.995 else "has the same error"
     return f"{name} is dominated by {other}, which {costs} and {makes}"

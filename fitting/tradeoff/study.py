@@ -21,6 +21,8 @@ from fitting.options import FitOptions
 from fitting.problem import resolve_objective
 from fitting.result import FitResult
 from fitting.rows import select_rows, ways_of
+from fitting.scene import load_scene
+from fitting.scene.stage import Stage
 from fitting.tradeoff.errors import errors_of
 from fitting.tradeoff.evaluation_cost import EvaluationCost, evaluation_cost
 from fitting.tradeoff.fit_cost import FitCost, fit_and_cost
@@ -28,6 +30,7 @@ from fitting.tradeoff.formula_trades import formula_trades, table_trades
 from fitting.tradeoff.noise_floor import noise_floors
 from fitting.tradeoff.precision_trades import data_trades, evaluation_trades
 from fitting.tradeoff.quadrature_trades import quadrature_trades
+from fitting.tradeoff.rendered_error import stage_of
 from fitting.tradeoff.sampling_trades import channel_trades, row_trades
 from fitting.tradeoff.solver_trades import start_trades, tolerance_trades
 from fitting.tradeoff.table import (
@@ -58,7 +61,7 @@ LADDER = (
 )
 
 # Units of progress: about seconds on a slow machine that has compiled nothing yet.
-_FIT, _EVALUATION, _ERRORS = 20.0, 3.0, 2.0
+_SCENE, _FIT, _EVALUATION, _ERRORS = 8.0, 20.0, 3.0, 2.0
 CANDIDATE = _FIT + _EVALUATION + _ERRORS
 
 Say = Callable[[str, float], None]
@@ -105,8 +108,11 @@ def ladder(measurement: Measurement) -> tuple[str, ...]:
 def units(plan: Plan) -> float:
     """How much there is to do, in the units that `study` says."""
     inside = sum(weight for _, weight in _INSIDE) if plan.vary else 0.0
-    more = plan.inside is not None and plan.inside not in _canonical(plan.models)
-    return CANDIDATE * (len(plan.models) + (plan.vary and more)) + inside
+    more = plan.inside is not None and not {*_canonical([plan.inside])} <= {
+        *_canonical(plan.models)
+    }
+    scene = 0.0 if plan.scene is None else _SCENE
+    return scene + CANDIDATE * (len(plan.models) + (plan.vary and more)) + inside
 
 
 def study(measurement: Measurement, plan: Plan, *, say: Say) -> Iterator[Tradeoff]:
@@ -117,10 +123,19 @@ def study(measurement: Measurement, plan: Plan, *, say: Say) -> Iterator[Tradeof
     """
     models = _canonical(plan.models)
     inside = None if plan.inside is None else Model(plan.inside).expression
+    scene = None if plan.scene is None else load_scene(plan.scene)
     table = _empty(measurement, plan, models)
+    stage = None
+    if scene is not None:
+        say("setting the scene", 0.0)
+        try:
+            stage = stage_of(measurement, scene)
+        except NotPossible as error:
+            table = _with(table, [], [], [f"image: {error}"])
+        say("setting the scene", _SCENE)
     examined: dict[str, _Examined] = {}
     for model in models:
-        examined[model] = _examine(measurement, model, plan, say)
+        examined[model] = _examine(measurement, model, plan, stage, say)
         found = [e.candidate for e in examined.values()]
         table = judged(msgspec.structs.replace(table, candidates=found))
         yield table
@@ -130,7 +145,7 @@ def study(measurement: Measurement, plan: Plan, *, say: Say) -> Iterator[Tradeof
         results = tuple(e.result for e in examined.values())
         inside = results[choose(results)[0]].model
     if inside not in examined:
-        examined[inside] = _examine(measurement, inside, plan, say)
+        examined[inside] = _examine(measurement, inside, plan, stage, say)
     table = msgspec.structs.replace(table, inside=inside)
     for what, weight in _INSIDE:
         say(f"inside {inside}: {what}", 0.0)
@@ -139,7 +154,9 @@ def study(measurement: Measurement, plan: Plan, *, say: Say) -> Iterator[Tradeof
         yield table
 
 
-def _examine(measurement: Measurement, model: str, plan: Plan, say: Say) -> _Examined:
+def _examine(
+    measurement: Measurement, model: str, plan: Plan, stage: Stage | None, say: Say
+) -> _Examined:
     say(f"{model}: fitting", 0.0)
     result, fitting = fit_and_cost(measurement, model, plan.options, repeats=plan.repeats)
     say(f"{model}: evaluating", _FIT)
@@ -147,7 +164,7 @@ def _examine(measurement: Measurement, model: str, plan: Plan, say: Say) -> _Exa
         model, measurement.n_channels, result.values, repeats=plan.repeats
     )
     say(f"{model}: errors", _EVALUATION)
-    errors = errors_of(measurement, result, plan.scene)
+    errors = errors_of(measurement, result, stage)
     say(f"{model}: errors", _ERRORS)
     candidate = Candidate(
         model=model,

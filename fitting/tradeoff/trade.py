@@ -102,20 +102,21 @@ def enough(group: Sequence[Trade], noise: float | None) -> str:
             return f"{best.varied}: what is as good as {best.reference} costs no less"
         limit = "0.1 %" if noise is None else f"a tenth of the noise, {percent(most)}"
         loses = f"deviates by more than {limit}" if best.deviation else "loses accuracy"
-        return f"{best.varied}: {best.reference} is needed; all else {loses}"
+        return f"{best.varied}: nothing replaces {best.reference}: all else {loses}"
     costs: list[str] = []
     if best.relative_work is not None and not _alike(best.relative_work, 1.0):
         costs.append(f"{best.relative_work:.2g} times the {best.work_unit}")
     if best.relative_seconds is not None:
         costs.append(f"{best.relative_seconds:.2g} times the time")
+    error = f"{number(best.relative_error, 4)} times the error"
     if best.deviation:
         error = f"off by at most {percent(best.worst or best.error)}"
         if noise is not None:
             error += f", where the noise is {percent(noise)}"
-    else:
-        error = f"{number(best.relative_error, 4)} times the error"
+    elif best.relative_error is not None and _alike(best.relative_error, 1.0, 5e-4):
+        error = "the same error"
     return (
-        f"{best.varied}: instead of {best.reference}, {best.setting} is enough: "
+        f"{best.varied}: {best.setting} will do in place of {best.reference}: "
         f"{' and '.join(costs)}, {error}"
     )
 
@@ -134,8 +135,8 @@ def _price(trade: Trade) -> tuple[float, float]:
     return work, 1.0 if trade.relative_seconds is None else trade.relative_seconds
 
 
-def _alike(a: float, b: float) -> bool:
-    return abs(a - b) < 0.005
+def _alike(a: float, b: float, within: float = 0.005) -> bool:
+    return abs(a - b) < within
 
 
 def _median(setting: Setting) -> float | None:
