@@ -72,6 +72,12 @@ def plot(
         return _list(json)
     if result is None:
         raise UsageError("plot: expected a result of `brdf fit`, or --list")
+    from fitting.plots import PlotsMissing, require
+
+    try:
+        require()
+    except PlotsMissing as error:
+        raise UsageError(str(error)) from error
     from fitting.cli import assignments, jax_setup, plot_run
     from fitting.result import load_result
 

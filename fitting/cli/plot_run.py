@@ -17,7 +17,7 @@ from fitting.cli.failures import UsageError
 from fitting.cli.flags import Flags
 from fitting.cli.terminal import stderr
 from fitting.cli.work import Work
-from fitting.plots import FIGURES, FORMATS, NoFigure, PlotsMissing, draw, save
+from fitting.plots import FIGURES, FORMATS, NoFigure, draw, save
 from fitting.plots.find_data import DataNotFound, find_data, read_again
 from fitting.quantities import channel_span
 from fitting.result import FitResult
@@ -103,10 +103,7 @@ def run(result: FitResult, path: Path, asked: Asked, flags: Flags) -> Done:
     """Draw and write. Figures that were not asked for by name may be left out."""
     _check_channels(result, asked)
     measurement, why = _data(result, path, asked)
-    try:
-        done = _drawn(result, measurement, why, path, asked, flags)
-    except PlotsMissing as error:
-        raise UsageError(str(error)) from error
+    done = _drawn(result, measurement, why, path, asked, flags)
     if not flags.quiet:
         console = stderr()
         if why:

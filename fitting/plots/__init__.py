@@ -33,6 +33,7 @@ __all__ = [
     "draw",
     "listed",
     "names",
+    "require",
     "save",
 ]
 
@@ -136,13 +137,17 @@ def save(
     write(pages, path, format=format, dpi=dpi)
 
 
-def _module(name: str) -> ModuleType:
+def require() -> None:
+    """Raises `PlotsMissing` without matplotlib, in a sentence that says what to do."""
     try:
-        return importlib.import_module(f"fitting.plots.{name}")
+        importlib.import_module("matplotlib")
     except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] != "matplotlib":
-            raise
         raise PlotsMissing(
             "figures need matplotlib, which is not installed; install the extra `plots`: "
             "pip install 'brdf-fitting[plots]'"
         ) from error
+
+
+def _module(name: str) -> ModuleType:
+    require()
+    return importlib.import_module(f"fitting.plots.{name}")

@@ -80,11 +80,11 @@ def read_again(result: FitResult, measurement: Measurement) -> str | None:
     """
     if measurement.provenance.sha256 != result.data.sha256:
         return "these are not the data that were fitted"
-    again = "give the options of its reader as for the fit (--reader)"
+    again = "give the options of the reader as for the fit (--reader)"
     if measurement.n_rows != result.data.rows:
         return (
-            f"the file has {measurement.n_rows} rows and had {result.data.rows} for the "
-            f"fit; {again}"
+            f"the data have {measurement.n_rows} rows and had {result.data.rows} for the "
+            f"fit; if it is the whole file, {again}"
         )
     now, then = score(measurement, result).scores.l2, result.scores.l2
     if math.isclose(now, then, rel_tol=_SAME, abs_tol=1e-12):

@@ -19,7 +19,7 @@ from fitting.plots.subject import Subject
 from fitting.solid_angle import from_normal, incidence_labels
 
 # How far from the plane a row may be.
-TOLERANCE_DEG = 1.0
+TOLERANCE_DEG = 0.3
 MOST = 6
 _DASHES = ("-", (0, (4, 1.5)))
 _FARTHEST = math.radians(89.5)

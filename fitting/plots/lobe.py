@@ -94,10 +94,10 @@ def _surface(
 ) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
     """Unit vectors ``(polar, azimuth)`` of detectors, and the model there."""
     peak = cut.peak(subject)
-    near = np.concatenate([-np.geomspace(0.3, 15, 18), [0.0], np.geomspace(0.3, 15, 18)])
-    polar = np.concatenate([np.linspace(0.0, 89.5, 60), math.degrees(peak) + near])
+    near = np.concatenate([-np.geomspace(0.3, 15, 13), [0.0], np.geomspace(0.3, 15, 13)])
+    polar = np.concatenate([np.linspace(0.0, 89.5, 40), math.degrees(peak) + near])
     polar = np.radians(np.unique(polar[(polar >= 0) & (polar <= 89.5)]))
-    turn = np.concatenate([np.linspace(-180, 180, 73), near])
+    turn = np.concatenate([np.linspace(-180, 180, 61), near])
     turn = np.radians(np.unique(np.round(turn, 6))) + math.pi
     halves = [polar, math.pi - polar[::-1]] if len(ways) > 1 else [polar]
     if len(ways) == 1 and ways[0] in ("down", "back"):

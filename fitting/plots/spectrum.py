@@ -1,4 +1,4 @@
-"""Coefficients over the spectrum, and other parameters of each channel, with error bands."""
+"""Coefficients and other parameters of each channel over the spectrum, with error bands."""
 
 from __future__ import annotations
 
