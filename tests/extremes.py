@@ -22,7 +22,7 @@ OFFSETS = np.array([1e-3 * k for k in (0, 0.3, 1, 3, 10, 30, 100)])
 # Lobes that describe a whole surface; any other is fitted beside a diffuse one.
 ALONE = {
     *("lambert", "oren_nayar", "eon", "burley", "interfaced_lambert", "minnaert"),
-    *("ashikhmin_shirley_diffuse", "rtls", "rpv", "hapke", "disney", "openpbr"),
+    *("ashikhmin_shirley_diffuse", "rtls", "rpv", "hapke", "disney", "openpbr", "gltf"),
 }
 _TWO = np.array([1.0, 0.6])
 _ALBEDO = 0.3 * _TWO

@@ -59,6 +59,7 @@ LOBES: dict[str, str] = {
     # Materials of renderers, to convert a fit to.
     "disney": "Disney",
     "openpbr": "OpenPBR",
+    "gltf": "GLTF",
 }
 
 

@@ -38,6 +38,7 @@ FORMULAS: dict[str, str] = {
     "smooth_slab": "transmission",
     "disney": "principled",
     "openpbr": "principled",
+    "gltf": "principled",
     "abg": "scatter",
     "harvey_shack": "scatter",
     "abc": "scatter",

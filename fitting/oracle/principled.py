@@ -122,3 +122,16 @@ def openpbr(s, t, o):
         left * multiple,
         (1 - metal) * q * (facing + rising) + metal * rising,
     )
+
+
+def gltf(s, t, o):
+    """glTF 2.0, appendix B, with KHR_materials_ior and KHR_materials_specular."""
+    metal, weight, ior = s["metallic"], s["specular"], s["ior"]
+    plain = {"fresnel": "schlick", "shadowing": "correlated"}
+    facing, rising = facets.ggx({"alpha": s["roughness"] ** 2}, t, plain)
+    q = (1 - mp.cos(t.theta_d)) ** 5
+    f0 = ((1 - ior) / (1 + ior)) ** 2
+    reflected = f0 + (1 - f0) * q
+    layer = facing + rising
+    with_base = (1 - metal) * (1 - weight * reflected) / mp.pi + metal * facing
+    return with_base, (1 - metal) * weight * reflected * layer + metal * rising

@@ -147,6 +147,31 @@ def test_openpbr_by_a_table_of_angles_is_the_same():
     np.testing.assert_allclose(tabled, plain, rtol=1e-12)
 
 
+@pytest.mark.parametrize("metal", [0.0, 0.4, 1.0])
+def test_gltf_of_its_specification(metal: float):
+    """The functions of appendix B and of KHR_materials_specular, on vectors."""
+    g = directions()
+    base, rough, ior, weight = 0.4, 0.5, 1.4, 0.7
+    light, view = (np.stack(np.broadcast_arrays(*v)) for v in (
+        (g.wix, g.wiy, g.cos_i), (g.wox, g.woy, g.cos_o)
+    ))  # fmt: skip
+    half = (light + view) / np.linalg.norm(light + view, axis=0)
+    v_h, n_h, n_l, n_v = np.sum(view * half, axis=0), half[2], light[2], view[2]
+    a2 = rough**4
+    density = a2 / (np.pi * (n_h**2 * (a2 - 1) + 1) ** 2)
+    visible = 0.5 / (
+        n_l * np.sqrt(n_v**2 * (1 - a2) + a2) + n_v * np.sqrt(n_l**2 * (1 - a2) + a2)
+    )
+    layer, q = density * visible, (1 - v_h) ** 5
+    f0 = min(((1 - ior) / (1 + ior)) ** 2, 1.0)
+    fr = f0 + (1 - f0) * q
+    dielectric = (1 - weight * fr) * base / np.pi + weight * fr * layer
+    expected = (1 - metal) * dielectric + metal * layer * (base + (1 - base) * q)
+    shape = {"metallic": metal, "roughness": rough, "ior": ior, "specular": weight}
+    with_base, without = of("gltf", g, **shape)
+    np.testing.assert_allclose(base * with_base + without, expected, rtol=1e-9)
+
+
 def principled_of_mitsuba(g: Geometry, base: float, **parameters: float) -> np.ndarray:
     mi = pytest.importorskip("mitsuba")
     mi.set_variant("scalar_rgb")
