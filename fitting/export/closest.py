@@ -21,6 +21,7 @@ class Candidate:
     """What a target could be given: its content, and what the target computes from it.
 
     ``final`` where nothing else could be closer: what is left is the gamut of colours.
+    ``faithful`` as in `Product`.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Candidate:
     ways: tuple[Way, ...] = ("front",)
     remarks: tuple[str, ...] = ()
     final: bool = False
+    faithful: bool = True
 
 
 def closest(surface: Surface, candidates: Iterable[Candidate]) -> Candidate:

@@ -75,6 +75,7 @@ def make(result: FitResult, request: Request, path: Path, say: Say) -> Product:
         conventions=(*_CONVENTIONS, colour),
         remarks=(*chosen.remarks, *ways_left_out(surface, chosen.ways, "this BSDF")),
         write=write,
+        faithful=chosen.faithful,
     )
 
 
@@ -100,5 +101,6 @@ def _candidates(surface: Surface, request: Request, say: Say) -> Iterator[Candid
 def _candidate(found: Sum, remarks: list[str]) -> Candidate:
     said = (*remarks, *found.remarks)
     return Candidate(
-        "sum", found.representation, found.tree, found.ways, said, final=found.exact
-    )
+        "sum", found.representation, found.tree, found.ways, said,
+        final=found.exact, faithful=found.faithful,
+    )  # fmt: skip

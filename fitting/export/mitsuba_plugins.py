@@ -27,6 +27,7 @@ class Plugin:
     - ``term``: what it computes, as a lobe of this program and its values.
     - ``light``: about the share of light that it scatters, for sampling.
     - ``exact``: whether it is the lobe itself.
+    - ``faithful``: whether Mitsuba computes the term itself.
     """
 
     build: Callable[[float], Tree]
@@ -35,13 +36,15 @@ class Plugin:
     ways: tuple[Way, ...] = _REFLECTION
     remarks: tuple[str, ...] = ()
     exact: bool = True
+    faithful: bool = True
 
 
 @dataclass(frozen=True)
 class Sum:
     """A tree of plugins, what it computes, and the ways of light that it knows.
 
-    ``exact`` where every plugin is the lobe that it stands for.
+    ``exact`` where every plugin is the lobe that it stands for, ``faithful`` where
+    Mitsuba computes the representation itself.
     """
 
     tree: Tree
@@ -49,6 +52,7 @@ class Sum:
     ways: tuple[Way, ...]
     remarks: tuple[str, ...]
     exact: bool
+    faithful: bool
 
 
 def sum_of_plugins(parts: Sequence[Part]) -> Sum | str:
@@ -71,6 +75,7 @@ def sum_of_plugins(parts: Sequence[Part]) -> Sum | str:
         ways,
         (*turned, *remarks),
         len(turned) < 2 and all(p.exact for p in plugins),
+        all(p.faithful for p in plugins),
     )
 
 
@@ -204,6 +209,7 @@ def _rough_dielectric(part: Part) -> Plugin:
     return Plugin(
         build, (term, part.values), float(np.mean([reflected, transmitted])),
         ways=("front", "back", "down", "up"), remarks=_of_beckmann(kind),
+        faithful=kind != "beckmann",
     )  # fmt: skip
 
 
@@ -241,8 +247,9 @@ def _conductor(facets: Facets, own: Values, term: str, remarks: tuple[str, ...])
     light = float(np.mean(own["scale"] * (normal + (1.0 - normal) / 21.0)))
     exact = facets.exact and facets.shadowing == "uncorrelated" and not facets.remarks
     return Plugin(
-        build, (term, {**facets.widths, **own}), light, remarks=remarks, exact=exact
-    )
+        build, (term, {**facets.widths, **own}), light, remarks=remarks, exact=exact,
+        faithful=facets.distribution != "beckmann",
+    )  # fmt: skip
 
 
 def _in_one_frame(plugins: list[Plugin]) -> tuple[list[Plugin], tuple[str, ...]]:

@@ -16,7 +16,7 @@ from fitting.export import mtlx_file
 from fitting.export.channels import linear_srgb
 from fitting.export.closest import ways_left_out
 from fitting.export.mtlx_file import Value
-from fitting.export.openpbr_fit import openpbr_of
+from fitting.export.one_lobe import one_lobe
 from fitting.export.surface import surface_of
 from fitting.export.target import Product, Request, Say
 from fitting.result import FitResult
@@ -36,13 +36,13 @@ def make(result: FitResult, request: Request, path: Path, say: Say) -> Product:
     """The fit as `open_pbr_surface`. Raises `ExportError`."""
     mixing = linear_srgb(result.channels, request.channels, request.illuminant)
     surface = surface_of(result, mixing)
-    found = openpbr_of(surface, say)
+    found = one_lobe(surface, "openpbr", say)
 
     def write(target: Path, comment: Sequence[str]) -> None:
         root = mtlx_file.document()
         own = mtlx_file.identifier(path.name.partition(".")[0] or "material")
         inputs: dict[str, Value] = {
-            n: v if n == "base_color" else float(v) for n, v in found.values.items()
+            n: v if v.ndim else float(v) for n, v in found.values.items()
         }
         shader = f"{own}_surface"
         mtlx_file.add_node(root, "open_pbr_surface", shader, "surfaceshader", inputs)
@@ -52,7 +52,7 @@ def make(result: FitResult, request: Request, path: Path, say: Say) -> Product:
 
     return Product(
         surface=surface,
-        representation=found.lobes,
+        representation=found.representation,
         ways=("front",),
         conventions=(*_CONVENTIONS, f"colours: {mixing.sentence}"),
         remarks=(*found.remarks, *ways_left_out(surface, ("front",), NAME)),

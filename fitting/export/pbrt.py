@@ -70,6 +70,7 @@ def make(result: FitResult, request: Request, path: Path, say: Say) -> Product:
         conventions=(*_CONVENTIONS, colour),
         remarks=(*chosen.remarks, *ways_left_out(surface, chosen.ways, "this material")),
         write=write,
+        faithful=chosen.faithful,
     )
 
 

@@ -175,4 +175,4 @@ def coated_diffuse(parts: Sequence[Part], remarks: Sequence[str]) -> Candidate |
                               "scale": gloss.part.values["scale"]}),
         ]
     )  # fmt: skip
-    return Candidate("coateddiffuse", lobes, leaf, remarks=tuple(said))
+    return Candidate("coateddiffuse", lobes, leaf, remarks=tuple(said), faithful=False)

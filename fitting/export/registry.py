@@ -14,7 +14,7 @@ from fitting.expression import ModelError
 if TYPE_CHECKING:
     from fitting.export.target import Target
 
-TARGETS = ("mitsuba", "pbrt", "materialx", "openpbr")
+TARGETS = ("mitsuba", "pbrt", "materialx", "openpbr", "gltf", "blender")
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ class Residual(msgspec.Struct, frozen=True):
 
     def __str__(self) -> str:
         if self.exact:
-            return "exact: the target computes the fitted model"
+            return "none, it is the formula of the fit"
         across = np.remainder(self.phi_r_deg - self.phi_i_deg, 360.0)
         return (
             f"relative RMS {self.relative_rms:.2g} (cosine-weighted, up to 85 deg); "
@@ -57,7 +57,8 @@ class Report(msgspec.Struct, frozen=True):
 
     ``represented_by`` names what the target computes, ``residual`` its distance from the
     fit, null where that depends on how the target interpolates a table. ``conventions``
-    are those of the file's numbers; ``remarks`` say what was changed or left out.
+    are those of the file's numbers; ``remarks`` say what was changed or left out. ``exact``
+    is whether the target computes the fitted model, but for rounding.
     """
 
     target: str
@@ -91,7 +92,7 @@ def report_of(target: str, file: str | None, product: Product) -> Report:
         file=file,
         model=product.surface.result.model,
         represented_by=representation.words if representation else "a table of its values",
-        exact=found is not None and found.exact,
+        exact=found is not None and found.exact and product.faithful,
         residual=found,
         channels=[c.name for c in product.surface.channels],
         conventions=list(product.conventions),

@@ -68,6 +68,8 @@ class Product:
     - ``conventions``: how its numbers are meant: alpha or roughness, cosine, colour.
     - ``remarks``: a sentence on everything that was changed or could not be represented.
     - ``write``: writes the file with some lines of comment.
+    - ``faithful``: whether the target computes the representation itself, and not
+      something near it, which a remark tells.
     """
 
     surface: Surface
@@ -76,6 +78,7 @@ class Product:
     conventions: tuple[str, ...]
     remarks: tuple[str, ...]
     write: Callable[[Path, Sequence[str]], None]
+    faithful: bool = True
 
 
 class Target(Protocol):

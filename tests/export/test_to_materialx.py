@@ -115,7 +115,7 @@ def test_openpbr_is_written_as_it_is(mx, library, tmp_path):
     assert "specular_roughness is the root" in (tmp_path / "a.mtlx").read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_openpbr_is_refitted(mx, library, tmp_path):
     """A glossy paint: near, for what OpenPBR's base is made for."""
     result = result_of("lambert + ggx", lambert__albedo=ALBEDO, ggx__f0=0.04, ggx__f90=1.0)
