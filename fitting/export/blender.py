@@ -80,7 +80,7 @@ def make(result: FitResult, request: Request, path: Path, say: Say) -> Product:
             *found.remarks,
             *_remark(found),
             *ways_left_out(surface, ("front",), "this material"),
-        ),  # fmt: skip
+        ),
         write=write,
         faithful=found["base_metalness"] == 1.0,
     )
