@@ -39,7 +39,7 @@ class BrdfTable:
     def __call__(self, geometry: Geometry) -> Float[Array, "n c"]:
         """Linear in all three between the eight nodes around each direction pair."""
         h, d, p, _ = self.values.shape
-        theta_h, theta_d, phi_d = _angles(geometry)
+        theta_h, theta_d, phi_d = half_and_difference(geometry)
         at = (
             (h - 1) * jnp.sqrt(theta_h * (2.0 / np.pi)),
             (d - 1) * theta_d * (2.0 / np.pi),
@@ -107,7 +107,7 @@ def _nodes(theta_h: np.ndarray, theta_d: np.ndarray, phi_d: np.ndarray) -> Geome
     return from_components(*turned(x, y), *turned(-x, -y))
 
 
-def _angles(g: Geometry) -> tuple[Array, Array, Array]:
+def half_and_difference(g: Geometry) -> tuple[Array, Array, Array]:
     """``theta_h, theta_d`` and ``phi_d``, the latter folded to [0, pi/2]."""
     flat = jnp.sqrt(g.hx * g.hx + g.hy * g.hy)
     some = flat > 0
