@@ -21,6 +21,7 @@ from fitting.given import with_given
 from fitting.model import Model
 from fitting.options import FitOptions
 from fitting.result import (
+    GIVEN_WEIGHTS,
     SCHEMA_VERSION,
     Channel,
     Energy,
@@ -29,7 +30,7 @@ from fitting.result import (
     Settings,
     Solver,
 )
-from fitting.rows import Rows, select_rows, with_noise_of
+from fitting.rows import Rows, select_rows, weighted, with_noise_of
 from fitting.search import again, predicted_by, robust_width, search
 from fitting.summary import Found, joined_values
 from fitting.uncertainty import covariance
@@ -73,6 +74,8 @@ def fit(
     say = progress or (lambda _: None)
     options = with_given(measurement, model, options)
     rows = select_rows(measurement, options.max_theta_deg, model.ways)
+    if isinstance(options.weights, np.ndarray):
+        rows = weighted(rows, options.weights)
     with jax.enable_x64(True):
         options, unseen = without_unseen(rows, model, options)
         found = _fit(measurement, rows, model, options, cross_validate, colour, say)
@@ -221,7 +224,7 @@ def _settings(objective: str, options: FitOptions) -> Settings:
 
     return Settings(
         objective=objective,
-        weights=options.weights,
+        weights=options.weights if isinstance(options.weights, str) else GIVEN_WEIGHTS,
         max_theta_deg=options.max_theta_deg,
         robust=options.robust,
         noise=options.noise,

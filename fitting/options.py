@@ -22,7 +22,8 @@ class FitOptions:
     - ``objective``: a name of `fitting.objectives.OBJECTIVES` or ``auto``, which is
       ``chi2`` where the data carry standard uncertainties and ``log1p`` where not.
     - ``weights``: ``solid-angle`` (each row counts for the part of the hemisphere that it
-      stands for) or ``rows``; ``chi2`` and ``l2`` are never weighted by solid angle.
+      stands for), ``rows``, or an array of one number from 0 on per row of the measurement;
+      ``chi2`` and ``l2`` are never weighted.
     - ``max_theta_deg``: rows beyond this polar angle, of source or detector, are left out.
     - ``robust``: pseudo-Huber residuals, with the width taken from a first plain fit.
     - ``noise``: relative and absolute standard uncertainty for ``chi2`` where the data
@@ -40,7 +41,7 @@ class FitOptions:
     """
 
     objective: ObjectiveName | Literal["auto"] = "auto"
-    weights: Literal["solid-angle", "rows"] = "solid-angle"
+    weights: Literal["solid-angle", "rows"] | np.ndarray = "solid-angle"
     max_theta_deg: float = 85.0
     robust: bool = False
     noise: tuple[float, float] | None = None
@@ -63,8 +64,15 @@ class FitOptions:
             raise ModelError(
                 f"no objective {self.objective!r}; choose of {', '.join(OBJECTIVES)}, auto"
             )
-        if self.weights not in ("solid-angle", "rows"):
-            refuse("weights", "'solid-angle' or 'rows'")
+        if isinstance(self.weights, np.ndarray):
+            w = self.weights
+            if w.ndim != 1 or not np.all(np.isfinite(w) & (w >= 0)) or not np.any(w > 0):
+                raise ModelError(
+                    "option weights: expected one finite number from 0 on per row, some "
+                    "above 0"
+                )
+        elif self.weights not in ("solid-angle", "rows"):
+            refuse("weights", "'solid-angle', 'rows', or an array")
         if not _is_number(self.max_theta_deg) or not 0 < self.max_theta_deg <= 90:
             refuse("max_theta_deg", "an angle above 0 and up to 90")
         if self.energy != "hard" and not (_is_number(self.energy) and self.energy >= 0):

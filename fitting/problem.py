@@ -57,7 +57,7 @@ def residual_terms(rows: Rows, objective: str, options: FitOptions) -> Terms:
         size = np.median(np.abs(value * kappa)[valid])
         kappa = kappa / (size if size > 0 else 1.0)
     per_row = np.ones(value.shape[1])
-    if spec.solid_angle and options.weights == "solid-angle":
+    if spec.solid_angle and not _is_named(options.weights, "rows"):
         per_row = np.sqrt(rows.solid_angle)
     weight = per_row[None] * valid
     if spec.uses_sigma:
@@ -66,6 +66,10 @@ def residual_terms(rows: Rows, objective: str, options: FitOptions) -> Terms:
         weight = weight[:1]
     target = objectives.transform(objective, value * kappa)
     return Terms(kappa, weight, target, value)
+
+
+def _is_named(weights: object, name: str) -> bool:
+    return isinstance(weights, str) and weights == name
 
 
 def standard_uncertainty(rows: Rows, options: FitOptions) -> np.ndarray:

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 SCHEMA_VERSION = 1
+# What settings call weights that were given row by row; they are not kept.
+GIVEN_WEIGHTS = "given"
 
 
 class ResultError(ValueError):

@@ -96,6 +96,21 @@ def select_rows(
     )
 
 
+def weighted(rows: Rows, weights: np.ndarray) -> Rows:
+    """The same rows, each counting as much as ``weights`` say, one per row of the file.
+
+    Raises `MeasurementError` if there are more or fewer, or if no row that is used counts.
+    """
+    if rows.index.size and rows.index.max() >= weights.size:
+        raise MeasurementError(
+            f"found {weights.size} weights; expected one for every row of the measurement"
+        )
+    own = weights[rows.index]
+    if not np.any(own > 0):
+        raise MeasurementError("no row that the fit uses has a weight above 0")
+    return dataclasses.replace(rows, solid_angle=own / own.mean())
+
+
 def with_noise_of(rows: Rows, fitted: np.ndarray) -> Rows:
     """The same rows, whose assumed noise follows a fit instead of the noisy values."""
     return dataclasses.replace(rows, fitted=fitted)

@@ -68,7 +68,8 @@ def options_of(settings: Settings) -> FitOptions:
 
     return FitOptions(
         objective=settings.objective,  # pyright: ignore[reportArgumentType]
-        weights=settings.weights,  # pyright: ignore[reportArgumentType]
+        # Weights that were given row by row are those of other rows.
+        weights="rows" if settings.weights == "rows" else "solid-angle",
         max_theta_deg=settings.max_theta_deg,
         robust=settings.robust,
         energy=settings.energy,

@@ -16,6 +16,7 @@ from fitting.rows import Rows, select_rows
 from fitting.scene.description import Scene
 from fitting.scene.difference import ALBEDO, Measure, measure
 from fitting.scene.emitters import Emitter
+from fitting.scene.importance import importance
 from fitting.scene.nodes import Nodes, nodes
 from fitting.scene.photometry import Photometry, photometry
 from fitting.scene.picture import Picture, of_directions, picture
@@ -60,7 +61,8 @@ class Stage:
     picture, or of an albedo that under an even sky: ``judged`` are its nodes, with weight
     only where the data support the value, ``weight (p,)`` of its pixels that are lit and
     known for the most part, ``of_data`` what the data give there, and ``again`` the same
-    with new noise. ``extrapolated (p,)`` is the share of the light of the picture's pixels
+    with new noise. ``importance (rows,)`` is how much each row matters to the picture.
+    ``extrapolated (p,)`` is the share of the light of the picture's pixels
     that rests on directions without data near them.
     """
 
@@ -78,6 +80,7 @@ class Stage:
     weight: np.ndarray
     of_data: Image
     again: Image
+    importance: np.ndarray
 
     @property
     def extrapolated_share(self) -> float:
@@ -162,6 +165,9 @@ def set_stage(
         extrapolated=extrapolated, judged=judged, weight=weight / weight.sum(),
         of_data=within,
         again=render_values(lambda g: reference.value(g, noisy=True), judged),
+        importance=importance(
+            rows.index.size, known, seen, whole, reference, light.tristimulus[:, 1]
+        ),
     )  # fmt: skip
 
 
