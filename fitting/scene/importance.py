@@ -25,11 +25,11 @@ _LEAST_CHANGE = 0.2
 
 
 def row_weights(stage: Stage, objective: ObjectiveName) -> np.ndarray:
-    """Weights ``(rows of the measurement,)`` with which an objective sees what a scene does.
+    """Weights ``(rows of the measurement,)`` by which an objective sees what a scene does.
 
     An error of one percent in a row's value shall count for its `importance`, however the
-    objective compresses values: a residual ``phi(v)`` changes by ``phi'(v) v`` then, and the
-    weight of its square is the importance over the square of that.
+    objective compresses values: a residual ``phi(v)`` changes by ``phi'(v) v`` then, and
+    the weight of its square is the importance over the square of that.
     """
     rows = stage.rows
     terms = residual_terms(rows, objective, FitOptions(objective=objective))

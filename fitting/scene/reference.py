@@ -199,7 +199,8 @@ class _Local:
         """Values ``(n, c)``, which leave the range of those nearby by a quarter of it at
         most: beyond the data nothing grows without bounds."""
         count = min(_NEARBY, len(self._mean))
-        near = self._mean[self._tree.query(points, k=np.arange(1, count + 1))[1]]
+        index = self._tree.query(points, k=count)[1].reshape(len(points), count)
+        near = self._mean[index]
         low, high = near.min(axis=1), near.max(axis=1)
         room = _OVERSHOOT * (high - low)
         return np.clip(self._between(points), low - room, high + room)

@@ -61,10 +61,13 @@ def refit(
     return min(found, key=lambda f: f.error.raw_mean)
 
 
-def confirmed(stage: Stage, found: Refit) -> tuple[FitResult, ImageError]:
+def confirmed(
+    stage: Stage, found: Refit, precision: str = "float64"
+) -> tuple[FitResult, ImageError]:
     """The same fit in full, with penalties and uncertainties, and its own error."""
     result = fit(stage.measurement, found.model, found.options)
-    return result, stage.error(found.model, result.values)
+    short = {"float32": "f32", "float64": "f64"}[precision]
+    return result, stage.error(found.model, result.values, precision=short)
 
 
 def _one(stage: Stage, expression: str, options: FitOptions) -> Refit:

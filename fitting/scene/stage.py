@@ -103,10 +103,10 @@ class Stage:
 
     def error_of(self, image: Image) -> ImageError:
         """How far a picture of what is judged is from that of the data."""
-        raw = self._statistics(image.radiance, self.of_data.radiance)
-        noise = self._statistics(self.again.radiance, self.of_data.radiance)
-        first = self._statistics(image.first, self.of_data.first)
-        second = self._statistics(image.second, self.of_data.second)
+        raw = self.statistics(image.radiance, self.of_data.radiance)
+        noise = self.statistics(self.again.radiance, self.of_data.radiance)
+        first = self.statistics(image.first, self.of_data.first)
+        second = self.statistics(image.second, self.of_data.second)
         pairs = zip(raw, noise, strict=True)
         clean = [math.sqrt(max(a * a - b * b, 0.0)) for a, b in pairs]
         return ImageError(
@@ -115,7 +115,13 @@ class Stage:
             quadrature_error=0.5 * abs(first[0] - second[0]),
         )  # fmt: skip
 
-    def _statistics(self, image: np.ndarray, data: np.ndarray) -> tuple[float, float]:
+    def within(self, error: ImageError) -> bool:
+        """Whether an error is within the scene's tolerance."""
+        found = (error.mean, error.percentile_95)
+        return all(e <= limit for e, limit in zip(found, self.measure.limits, strict=False))
+
+    def statistics(self, image: np.ndarray, data: np.ndarray) -> tuple[float, float]:
+        """Mean and 95th percentile of the difference of two pictures of what is judged."""
         return self.measure.statistics(self.measure.between(image, data), self.weight)
 
 

@@ -1,0 +1,207 @@
+"""A choice in words: what candidates change and cost, what is not seen, what not known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from fitting.quantities import count
+from fitting.scene.choice import Candidate
+from fitting.scene.difference import ALBEDO, COLOUR
+from fitting.scene.refit import Refit
+from fitting.scene.render import render
+from fitting.scene.stage import ImageError, Stage, incidences
+
+# Full width of a GGX lobe at half height, in plane at normal incidence: 2.57 alpha rad.
+GGX_WIDTH = 2.57
+_UNUSED, _DARK = 0.03, 1e-3
+_WORST = 0.1
+
+
+def amount(stage: Stage, value: float) -> str:
+    """An error in the measure of the scene."""
+    if stage.measure.name == COLOUR:
+        return f"{value:.2g}" if value < 10 else f"{value:.0f}"
+    if stage.measure.name == ALBEDO:
+        return f"{value:.2g}"
+    return f"{100 * value:.2g} %"
+
+
+def named(candidate: Candidate) -> str:
+    """The model, and what is special about its parameters."""
+    return candidate.model + (
+        " with a shape per channel" if candidate.per_channel_shape else ""
+    )
+
+
+def sentence(stage: Stage, one: Candidate, kept: Candidate) -> str:
+    """What a candidate changes in the scene, and what it costs."""
+    if one == kept or (one.model, one.per_channel_shape) == (
+        kept.model,
+        kept.per_channel_shape,
+    ):
+        return "kept"
+    ratio = one.operations / max(kept.operations, 1e-300)
+    price = f"costs {ratio:.2g} times as much" if ratio >= 1 else f"costs {ratio:.2g} of it"
+    change = f"changes this scene by {amount(stage, one.change)}"
+    missing = "" if one.within_tolerance else f", and misses {_missed(stage, one.error)}"
+    return f"{named(one)} {change} and {price}{missing}"
+
+
+def verdict(
+    stage: Stage,
+    candidates: Sequence[Candidate],
+    chosen: int,
+    met: bool,
+    error: ImageError,
+    found: Refit,
+) -> str:
+    """The answer in one sentence."""
+    kept = candidates[chosen]
+    size = amount(stage, error.mean)
+    if met:
+        cheaper = [c for c in candidates if c.operations < kept.operations]
+        only = ", and nothing cheaper is within it" if cheaper else ""
+        return (
+            f"{named(kept)} is enough for {stage.scene.name}: off by {size} on average "
+            f"({_limits(stage)}){only}"
+        )
+    return (
+        f"nothing asked for is within the tolerance of {stage.scene.name} "
+        f"({_limits(stage)}); {named(kept)} comes nearest and misses "
+        f"{_missed(stage, error)}, most {_where(stage, found)}"
+    )
+
+
+def unseen(stage: Stage, found: Refit) -> list[str]:
+    """What the scene cannot see, and what is therefore left out."""
+    out: list[str] = []
+    unused = float(np.mean(stage.importance < _UNUSED))
+    if unused > 0.005:
+        out.append(
+            f"{100 * unused:.0f} % of the measured rows are in directions that this scene "
+            "hardly uses; they count for next to nothing in the fit"
+        )
+    theta, power = incidences(stage.lights)
+    reached = np.cumsum(power) / power.sum()
+    low, high = np.degrees(np.interp([0.005, 0.995], reached, theta))
+    out.append(f"light arrives at {low:.0f} to {high:.0f} deg from the normal")
+    finest = min(2 * e.half_angle if e.half_angle < 0.3 else e.finest
+                 for e in stage.photometry.emitters)  # fmt: skip
+    narrow = [
+        f"{label}.{name} = {alpha:.3g}"
+        for label, name, alpha in _widths(found)
+        if alpha < finest / GGX_WIDTH
+    ]
+    if narrow:
+        out.append(
+            f"the smallest light is {math.degrees(finest):.2g} deg wide, and shapes of "
+            f"lobes finer than alpha = {finest / GGX_WIDTH:.2g} cannot be told: "
+            f"{', '.join(narrow)} stands for anything below"
+        )
+    light = sum(np.abs(e.spectrum).sum(axis=0) for e in stage.photometry.emitters)
+    light = np.asarray(light) * stage.photometry.counts
+    seen = light * np.abs(stage.photometry.tristimulus).sum(axis=1)
+    dark = seen < _DARK * seen.max()
+    if dark.any():
+        names = [c.name for c, d in zip(stage.measurement.channels, dark, strict=True) if d]
+        listed = ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")
+        out.append(
+            f"{count(len(names), 'channel')} ({listed}) without light or without weight "
+            "for this observer"
+        )
+    return out
+
+
+def unsupported(stage: Stage, kept: Candidate) -> list[str]:
+    """What the data cannot support."""
+    out: list[str] = []
+    share = stage.extrapolated_share
+    if share >= 0.0005:
+        out.append(
+            f"{100 * share:.1f} % of the light in the picture comes by directions without "
+            "data near them; there the model is an extrapolation, and no difference is "
+            "judged"
+        )
+    left = 1.0 - float(stage.picture.weight @ (stage.extrapolated <= 0.5))
+    if left >= 0.005:
+        out.append(
+            f"{100 * left:.0f} % of the picture rests on such directions for the most"
+        )
+    noise = kept.error.noise
+    out.append(
+        f"the noise of the data alone makes {amount(stage, noise)} in this scene (mean); "
+        "it is taken off the errors"
+    )
+    if noise > stage.measure.limits[0]:
+        out.append("that is more than the tolerance: repeat the measurement to tell more")
+    through = int(np.sum(stage.measurement.transmitted))
+    if through:
+        out.append(
+            f"{count(through, 'row')} of transmitted light are left out: a scene shows "
+            "what is reflected at the front"
+        )
+    return out
+
+
+def _limits(stage: Stage) -> str:
+    limits = stage.measure.limits
+    name = "CIEDE2000" if stage.measure.name == COLOUR else stage.measure.name
+    if len(limits) == 1:
+        return f"tolerance: {name} {amount(stage, limits[0])}"
+    return (
+        f"tolerance: {name} {amount(stage, limits[0])} on average, "
+        f"{amount(stage, limits[1])} for 95 % of the picture"
+    )
+
+
+def _missed(stage: Stage, error: ImageError) -> str:
+    limits = stage.measure.limits
+    if error.mean > limits[0] or len(limits) == 1:
+        return f"it by {amount(stage, max(error.mean - limits[0], 0.0))} on average"
+    return (
+        f"it by {amount(stage, max(error.percentile_95 - limits[1], 0.0))} at the 95th "
+        "percentile"
+    )
+
+
+def _where(stage: Stage, found: Refit) -> str:
+    """The directions behind the tenth of the picture that is worst."""
+    if stage.measure.name == ALBEDO:
+        return "as an albedo"
+    image = render(found.model, found.values, stage.judged).radiance
+    each = stage.measure.between(image, stage.of_data.radiance).mean(axis=1)
+    each = np.where(stage.weight > 0, each, -1.0)
+    worst = np.argsort(-each)[: max(1, int(_WORST * np.sum(stage.weight > 0)))]
+    there = np.isin(np.arange(stage.picture.size), worst)
+    angles: list[np.ndarray] = []
+    powers: list[np.ndarray] = []
+    for light in stage.judged:
+        chosen = there[light.sum % light.pixels]
+        g = light.geometry
+        value = np.abs(stage.reference.value(g)).sum(axis=1)
+        powers.append((light.weight.sum(axis=0) * value)[chosen])
+        cosines = np.stack([g.cos_i, g.cos_o, g.hz])[:, chosen]
+        angles.append(np.degrees(np.arccos(np.clip(cosines, -1, 1))))
+    power = np.concatenate(powers)
+    theta_i, theta_r, theta_h = np.concatenate(angles, axis=1) @ power / power.sum()
+    return (
+        f"where light arrives at about {theta_i:.0f} deg and is seen at {theta_r:.0f} deg, "
+        f"half vectors {theta_h:.0f} deg off the normal"
+    )
+
+
+def _widths(found: Refit) -> list[tuple[str, str, float]]:
+    """Widths of facet lobes, by name."""
+    out: list[tuple[str, str, float]] = []
+    for i, (label, lobe) in enumerate(
+        zip(found.model.labels, found.model.lobes, strict=True)
+    ):
+        own = found.model.of_lobe(i, found.values)
+        shape = {p.name: own[p.name] for p in lobe.parameters() if not p.coefficient}
+        for name in ("alpha", "alpha_x", "alpha_y"):
+            if name in shape:
+                out.append((label, name, float(np.min(shape[name]))))
+    return out
