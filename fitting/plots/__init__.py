@@ -44,6 +44,8 @@ FIGURES = (
     "lobe",
     "image_slice",
     "beta",
+    "sphere",
+    "patch",
     "residuals",
     "albedo",
     "spectrum",

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -11,10 +13,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from made_up_results import result_of
+from matplotlib.figure import Figure
 
 import data_formats
 from data_formats import Channel, Measurement
 from fitting import sample
+from fitting.plots import draw
+from fitting.plots.style import styled
 from fitting.result import FitResult
 
 
@@ -75,6 +80,33 @@ def leaf() -> Case:
            "lambert_transmission.transmittance":
                values["lambert_transmission.transmittance"]}  # fmt: skip
     return Case(result_of(model, own, data), data)
+
+
+@pytest.fixture(scope="session")
+def drawn(paint: Case, matt: Case, leaf: Case) -> Callable[..., Figure]:
+    """A figure of one of the cases, drawn and rendered once for all tests."""
+    cases = {"paint": paint, "matt": matt, "leaf": leaf}
+
+    @functools.cache
+    def figure(kind: str, name: str, *, data: bool = True) -> Figure:
+        case = cases[kind]
+        out = draw(name, case.result, case.data if data else None)
+        file = io.BytesIO()
+        with styled():
+            out.savefig(file, format="png", dpi=40)
+        assert file.getvalue().startswith(b"\x89PNG")
+        return out
+
+    return figure
+
+
+@pytest.fixture(autouse=True)
+def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few pixels and few nodes for each: what is tested does not depend on them."""
+    monkeypatch.setattr("fitting.plots.sphere._PIXELS", 12)
+    monkeypatch.setattr("fitting.plots.patch._POLAR", 6)
+    monkeypatch.setattr("fitting.plots.patch._AROUND", 8)
+    monkeypatch.setattr("fitting.plots.rendered._PER_PIXEL", 8)
 
 
 @pytest.fixture

@@ -64,7 +64,7 @@ def test_folder_format_and_json(run, saved, tmp_path):
 
 
 def test_pages_of_one_pdf(run, saved):
-    code, out, _ = run(saved(), "starts", "spectrum", "-o", "both.pdf")
+    code, out, _ = run(saved(), "starts", "correlations", "-o", "both.pdf")
     assert (code, out) == (0, "both.pdf\n")
     assert len(re.findall(rb"/Type /Page\b", Path("both.pdf").read_bytes())) == 2
 

@@ -17,8 +17,8 @@ def lines(axes, label: str) -> list:
     return [line for line in axes.lines if line.get_label() == label]
 
 
-def test_residuals_are_in_units_of_sigma(matt):
-    axes = draw("residuals", matt.result, matt.data).axes
+def test_residuals_are_in_units_of_sigma(matt, drawn):
+    axes = drawn("matt", "residuals").axes
     (points,) = lines(axes[0], "mono")
     expected = (0.22 / math.pi - matt.data.value[:, 0]) / 0.002
     np.testing.assert_allclose(np.sort(points.get_ydata()), np.sort(expected), rtol=1e-9)
@@ -45,8 +45,8 @@ def test_residuals_without_sigma_are_relative_to_both(paint):
     assert low == -high < 0
 
 
-def test_angles_from_the_mirror_direction(paint):
-    axes = draw("residuals", paint.result, paint.data).axes[0]
+def test_angles_from_the_mirror_direction(paint, drawn):
+    axes = drawn("paint", "residuals").axes[0]
     drawn = np.concatenate([li.get_xdata() for li in lines(axes, "550 nm")])
     m = paint.data
     wo = np.array([np.sin(m.theta_r) * np.cos(m.phi_r), np.sin(m.theta_r) * np.sin(m.phi_r),
@@ -56,8 +56,8 @@ def test_angles_from_the_mirror_direction(paint):
     np.testing.assert_allclose(np.sort(drawn), np.sort(expected), atol=1e-5)
 
 
-def test_albedo_of_matt_surfaces_and_the_energy_limit(leaf):
-    front, back, *coverage = draw("albedo", leaf.result, leaf.data, channels=("G",)).axes
+def test_albedo_of_matt_surfaces_and_the_energy_limit(drawn):
+    front, back, *coverage = drawn("leaf", "albedo").axes
     for axes in (front, back):
         for name, value in (("reflected", 0.4), ("transmitted", 0.3), ("together", 0.7)):
             (curve,) = lines(axes, f"{name}, G")
@@ -79,8 +79,8 @@ def test_albedo_says_why_there_are_no_sums(paint):
     assert any("no sums of the data" in text.get_text() for text in figure.texts)
 
 
-def test_spectrum_holds_values_and_intervals(paint):
-    figure = draw("spectrum", paint.result)
+def test_spectrum_holds_values_and_intervals(paint, drawn):
+    figure = drawn("paint", "spectrum")
     by_title = {axes.get_title(loc="left"): axes for axes in figure.axes}
     assert set(by_title) >= {"lambert.albedo", "ggx1.f0", "ggx2.f90"}
     axes = by_title["lambert.albedo"]
@@ -135,8 +135,8 @@ def test_correlations_that_are_not_known_are_crossed_out(leaf):
     assert len(lines(axes, "_none")) == 5
 
 
-def test_starts_are_counted(paint):
-    left, right = draw("starts", paint.result).axes
+def test_starts_are_counted(paint, drawn):
+    left, right = drawn("paint", "starts").axes
     (agreeing,), (elsewhere,) = lines(left, "agreeing"), lines(left, "elsewhere")
     assert (agreeing.get_xdata().size, elsewhere.get_xdata().size) == (6, 2)
     (other,) = lines(right, "next")
