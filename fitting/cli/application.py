@@ -62,7 +62,7 @@ Examples:
     "plot": """\
 Examples:
   brdf plot --list                            what there is
-  brdf plot paint.fit.json                    all that apply, as paint.FIGURE.png
+  brdf plot paint.fit.json                    all, as paint.FIGURE.png
   brdf plot paint.fit.json slices beta -o figures --format svg
   brdf plot paint.fit.json slices --channel '450 nm' -o slices.pdf
   brdf plot paint.fit.json -o paint.pdf       all, a page each
