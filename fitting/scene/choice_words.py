@@ -44,9 +44,11 @@ def sentence(stage: Stage, one: Candidate, kept: Candidate) -> str:
     ):
         return "kept"
     ratio = one.operations / max(kept.operations, 1e-300)
-    price = f"costs {ratio:.2g} times as much" if ratio >= 1 else f"costs {ratio:.2g} of it"
+    price = f"costs {ratio:.2g} times as much"
     change = f"changes this scene by {amount(stage, one.change)}"
-    missing = "" if one.within_tolerance else f", and misses {_missed(stage, one.error)}"
+    missing = ""
+    if not one.within_tolerance:
+        missing = f", and misses the tolerance by {_missed(stage, one.error)}"
     return f"{named(one)} {change} and {price}{missing}"
 
 
@@ -70,7 +72,7 @@ def verdict(
         )
     return (
         f"nothing asked for is within the tolerance of {stage.scene.name} "
-        f"({_limits(stage)}); {named(kept)} comes nearest and misses "
+        f"({_limits(stage)}); {named(kept)} comes nearest and misses it by "
         f"{_missed(stage, error)}, most {_where(stage, found)}"
     )
 
@@ -160,10 +162,9 @@ def _limits(stage: Stage) -> str:
 def _missed(stage: Stage, error: ImageError) -> str:
     limits = stage.measure.limits
     if error.mean > limits[0] or len(limits) == 1:
-        return f"it by {amount(stage, max(error.mean - limits[0], 0.0))} on average"
+        return f"{amount(stage, max(error.mean - limits[0], 0.0))} on average"
     return (
-        f"it by {amount(stage, max(error.percentile_95 - limits[1], 0.0))} at the 95th "
-        "percentile"
+        f"{amount(stage, max(error.percentile_95 - limits[1], 0.0))} at the 95th percentile"
     )
 
 
