@@ -223,7 +223,7 @@ def _group(out: Console, group: list[Trade]) -> None:
             t.setting,
             "-" if t.seconds is None else _duration(t.seconds),
             number(t.relative_seconds, 2),
-            number(t.work, 4),
+            f"{t.work:.0f}",
             number(t.relative_work, 2),
             number(t.error, 3),
             "" if t.worst is None else number(t.worst, 3),

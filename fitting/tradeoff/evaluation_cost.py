@@ -123,7 +123,7 @@ def operations(model: str, channels: int, *, per_channel_shape: bool = False) ->
 
     Of all weights 30 makes the times of the lobes of this package most nearly proportional
     to it in float32 on x86 (least RMS of the logarithm; 50 in float64): half of them are
-    within a factor of 1.7. What the compiler does not vectorise there (atan2 in ``eon`` and
+    within a factor of 1.9. What the compiler does not vectorise there (atan2 in ``eon`` and
     ``rtls``) takes up to ten times longer, as do quadratures whose nodes leave the cache
     (``student_t``, ``gtr``); hardly anything takes less than half. The table is in the
     README; ``tests/benchmarks/lobe_costs.py`` makes it.

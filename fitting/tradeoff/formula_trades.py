@@ -24,7 +24,7 @@ from fitting.tradeoff.tabulated import table_of
 from fitting.tradeoff.timing import timed
 from fitting.tradeoff.trade import Setting, Trade, trades
 
-_POINTS = 1 << 14
+_POINTS = 1 << 16
 _ETA, _ROUGHNESS, _ALBEDO = 1.5, 0.5, 0.5
 _FARTHEST_X = 3.0
 TABLE_SIZES = ((90, 45, 45), (45, 23, 23), (23, 12, 12))
@@ -89,7 +89,7 @@ def _compare(case: Case, repeats: int) -> list[Trade]:
         kernel = Kernel(function, *arguments, precision="float32")
         one = Kernel(function, *_first(arguments), precision="float32")
         count = count_of(kernel, _POINTS, one)
-        seconds = timed(kernel.run, repeats, calls=5, warm=False).scaled(1.0 / _POINTS)
+        seconds = timed(kernel.run, repeats, calls=10, warm=False).scaled(1.0 / _POINTS)
         settings.append(Setting(name, seconds, count.operations, typical, worst))
     return trades(
         varied,

@@ -40,11 +40,11 @@ def evaluation_trades(
     rounded = _in_float32(model, result.values, g)
     off = relative_deviation(rounded, exact)
     settings = [
-        Setting("float64", _seconds(cost, "float64"), cost.operations, 0.0, 0.0),
+        Setting("float64", _seconds(cost, "float64"), 8.0, 0.0, 0.0),
         Setting(
             "float32",
             _seconds(cost, "float32"),
-            cost.operations,
+            4.0,
             float(np.median(off)),
             float(np.max(off)),
         ),
@@ -53,7 +53,7 @@ def evaluation_trades(
         "precision of evaluation",
         settings,
         cost_of="evaluation",
-        work_unit="operations",
+        work_unit="bytes per number",
         error_of="relative deviation at the rows",
         deviation=True,
     )
@@ -93,7 +93,7 @@ def data_trades(
         "precision of the data (the solver runs in float64 only)",
         settings,
         cost_of="fit",
-        work_unit="bytes per value",
+        work_unit="bytes per number",
         error_of=f"{of}, all rows",
         deviation=False,
     )

@@ -54,7 +54,7 @@ def row_trades(
             Setting(
                 _one_of(k, "rows"),
                 _warm_seconds(part, result, options, repeats),
-                float(np.median(used)),
+                float(used[0]),
                 float(np.median(errors)),
                 max(errors),
             )

@@ -20,7 +20,7 @@ from fitting.solve import Solution, refine
 from fitting.summary import Found
 from fitting.tradeoff.fit_cost import problem_of
 from fitting.tradeoff.timing import Spread, spread, timed
-from fitting.tradeoff.trade import Setting, Trade, trades
+from fitting.tradeoff.trade import NotPossible, Setting, Trade, trades
 
 TOLERANCES = (1e-13, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2)
 STARTS = (16, 8, 4, 2, 1)
@@ -65,11 +65,13 @@ def start_trades(
     """How many of the best points of the scan are refined, of which the best end is kept.
 
     The best of a few starts are the first of many, so that the sixteen runs, each timed on
-    its own, tell about all smaller numbers.
+    its own, tell about all smaller numbers. Raises `NotPossible` where there is only one.
     """
     with jax.enable_x64(True):
         rows, problem, options = problem_of(measurement, result.model, options)
         points, coefficients = starts.best_starts(problem, STARTS[0])
+        if len(points) < 2:
+            raise NotPossible("the scan of the shape leaves a single start")
         ends: list[Solution] = []
         seconds: list[list[float]] = []
         for u, x in zip(points, coefficients, strict=True):
