@@ -76,8 +76,8 @@ def test_any_rows_of_noise_free_data_tell_the_truth():
     found = row_trades(matt(), result, PLAIN, repeats=1)
     assert len(found) == 4
     assert max(t.worst for t in found) < 1e-12
-    shares = np.array([t.work / result.data.rows_used for t in found])
-    np.testing.assert_allclose(shares, [1.0, 0.5, 0.25, 0.125], rtol=0.1)
+    for t, k in zip(found, (1, 2, 4, 8), strict=True):
+        assert abs(t.work - result.data.rows_used / k) <= 3
 
 
 def test_choices_of_rows_are_apart_and_together_everything():
