@@ -102,6 +102,23 @@ def patch_count(rings: Sequence[Ring]) -> int:
     return sum(ring.n_phi for ring in rings)
 
 
+def definition(name: str) -> str:
+    """The XML that defines a basis of `BASES`."""
+    lines = ["<AngleBasis>", f"<AngleBasisName>{name}</AngleBasisName>"]
+    for ring in BASES[name]:
+        lines += [
+            "<AngleBasisBlock>",
+            f"<Theta>{ring.theta:g}</Theta>",
+            f"<nPhis>{ring.n_phi}</nPhis>",
+            "<ThetaBounds>",
+            f"<LowerTheta>{ring.low:g}</LowerTheta>",
+            f"<UpperTheta>{ring.high:g}</UpperTheta>",
+            "</ThetaBounds>",
+            "</AngleBasisBlock>",
+        ]
+    return "\n".join([*lines, "</AngleBasis>", ""])
+
+
 def pairs(incident: Basis, outgoing: Basis) -> Patches:
     """All pairs, the outgoing patch changing slowest.
 

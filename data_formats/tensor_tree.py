@@ -153,9 +153,9 @@ def pairs(tree: Cells) -> tuple[Patches, Array, int]:
         middle = (corner[:, 0] + np.minimum(corner[:, 0] + size, 0.5)) / 2
         sin_i, phi_i = 1 - 2 * middle, np.full_like(middle, np.pi)
     else:
-        sin_i, phi = _disk(centre[:, 0], centre[:, 1])
+        sin_i, phi = disk(centre[:, 0], centre[:, 1])
         phi_i = phi + np.pi
-    sin_r, phi_r = _disk(centre[:, -2], centre[:, -1])
+    sin_r, phi_r = disk(centre[:, -2], centre[:, -1])
     patches = Patches(
         theta_i=np.arcsin(sin_i),
         phi_i=phi_i,
@@ -168,7 +168,7 @@ def pairs(tree: Cells) -> tuple[Patches, Array, int]:
     return patches, value, left_out
 
 
-def _disk(x: Array, y: Array) -> tuple[Array, Array]:
+def disk(x: Array, y: Array) -> tuple[Array, Array]:
     """Polar coordinates on the unit disk of points of the unit square."""
     a, b = 2 * x - 1, 2 * y - 1
     flat = np.abs(a) > np.abs(b)
@@ -176,3 +176,92 @@ def _disk(x: Array, y: Array) -> tuple[Array, Array]:
     ratio = np.divide(np.where(flat, b, a), radius, out=np.zeros_like(a), where=radius != 0)
     phi = np.pi / 4 * np.where(flat, ratio, 2 - ratio)
     return np.abs(radius), phi + np.pi * (radius < 0)
+
+
+@dataclass(frozen=True)
+class CellsAt:
+    """Rows as the cells of a tree: `rank`, and which row is in which cell.
+
+    **Arguments:**
+
+    - `places`: by level (0 is the whole) and index along each coordinate.
+    """
+
+    rank: int
+    places: dict[tuple[int, ...], int]
+    deepest: int
+
+    def text(self, values: list[float]) -> str:
+        """The tree of the rows' values, a node per line."""
+        out: list[str] = []
+        self._node((0,) * self.rank, 0, values, out)
+        return "\n".join(out)
+
+    def _node(
+        self, index: tuple[int, ...], level: int, values: list[float], out: list[str]
+    ) -> None:
+        row = self.places.get((level, *index))
+        if row is not None:
+            out.append(f"{{ {values[row]!r} }}")
+            return
+        # Directions of incidence of an isotropic tree are in its lower half.
+        if self.rank == 3 and level and index[0] >= 1 << (level - 1):
+            out.append("{ 0.0 }")
+            return
+        if level >= self.deepest:
+            raise MeasurementError(
+                f"the rows are no whole tree: nothing is at cell {index} of level {level}"
+            )
+        out.append("{")
+        for child in range(1 << self.rank):
+            below = tuple(2 * n + (child >> k & 1) for k, n in enumerate(index))
+            self._node(below, level + 1, values, out)
+        out.append("}")
+
+
+def cells_at(
+    theta_i: Array, phi_i: Array, theta_r: Array, phi_r: Array, area: Array, where: str
+) -> CellsAt:
+    """The cells whose centres `pairs` gives, from angles of the file's frame and areas.
+
+    **Raises:** `MeasurementError` if areas and directions are not those of cells, or a cell
+    is there twice.
+    """
+    level = np.rint(-0.5 * np.log2(np.maximum(area, 1e-30) / np.pi)).astype(np.int64)
+    if level.min() < 0 or level.max() > _DEEPEST:
+        raise MeasurementError(f"{where}: areas of {area.min():g} to {area.max():g} sr")
+    size = 0.5**level
+    turned = np.remainder(phi_i, 2 * np.pi)
+    rank = 3 if np.ptp(turned) < 1e-9 and abs(turned[0] - np.pi) < 1e-9 else 4
+    x, y = square(np.sin(theta_r), phi_r)
+    if rank == 3:
+        # The cell of the whole is seen at the middle of its lower half.
+        first = [(1 - np.sin(theta_i)) / 2 + np.where(level == 0, 0.25, 0.0)]
+    else:
+        first = list(square(np.sin(theta_i), phi_i - np.pi))
+    centre = np.stack([*first, x, y], axis=1)
+    index = centre / size[:, None] - 0.5
+    off = float(np.max(np.abs(index - np.rint(index))))
+    if off > 1e-3:
+        raise MeasurementError(
+            f"{where}: directions are not at the centres of cells of their "
+            "projected_solid_angle; write csv, or fit a model and export that"
+        )
+    places: dict[tuple[int, ...], int] = {}
+    for row, (own, key) in enumerate(
+        zip(level.tolist(), np.rint(index).astype(np.int64).tolist(), strict=True)
+    ):
+        if (own, *key) in places:
+            raise MeasurementError(f"{where}: two rows are in one cell of the tree")
+        places[own, *key] = row
+    return CellsAt(rank, places, int(level.max()))
+
+
+def square(radius: Array, phi: Array) -> tuple[Array, Array]:
+    """Points of the unit square from polar coordinates on the unit disk."""
+    turn = np.remainder(phi + np.pi / 4, 2 * np.pi) - np.pi / 4
+    quarter = np.minimum(np.floor((turn + np.pi / 4) / (np.pi / 2)), 3)
+    across = (turn - quarter * np.pi / 2) * 4 / np.pi * radius
+    a = np.choose(quarter.astype(np.int64), [radius, -across, -radius, across])
+    b = np.choose(quarter.astype(np.int64), [across, radius, -across, -radius])
+    return (a + 1) / 2, (b + 1) / 2

@@ -33,6 +33,7 @@ from data_formats.plain_xml import Element
 from data_formats.provenance import one_line
 from data_formats.source import Source, load
 from data_formats.survey import describe, in_wavelength_order
+from data_formats.window_writer import write as write
 
 NAME = "window"
 SUFFIXES = (".xml",)

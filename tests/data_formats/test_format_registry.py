@@ -55,6 +55,7 @@ def test_formats_are_listed():
         "mbsdf",
         "merl",
         "ssdd",
+        "window",
         "zemax",
     }
     assert all(info.description.endswith(".") for info in infos.values())
