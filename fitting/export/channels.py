@@ -111,7 +111,7 @@ def tristimulus(
     if sorted(upper) == ["B", "G", "R"]:
         order = [upper.index(n) for n in "RGB"]
         said = "R, G and B of the fit are taken for linear values of the sRGB primaries"
-        return Mixing(_XYZ, np.eye(3)[:, order] @ np.linalg.inv(_xyz_to_srgb("D65")), said)
+        return Mixing(_XYZ, np.eye(3)[:, order] @ srgb_to_xyz(), said)
     w = np.array([c.wavelength_nm or np.nan for c in channels])
     visible = np.isfinite(w) & (w >= VISIBLE_NM[0]) & (w <= VISIBLE_NM[1])
     if np.count_nonzero(visible) < FEWEST_WAVELENGTHS or not np.isfinite(w).all():
@@ -137,6 +137,21 @@ def index_of(channels: Sequence[results.Channel], name: str) -> int:
     raise ModelError(f"--channels {name}: there is no such channel; known: {known}")
 
 
+def srgb_to_xyz() -> np.ndarray:
+    """``xyz = rgb @ matrix`` of linear sRGB, 1 in Y for white."""
+    return np.linalg.inv(_xyz_to_srgb("D65"))
+
+
+def to_equal_energy(illuminant: str = "D65") -> np.ndarray:
+    """``xyz_e = xyz @ matrix`` with ``X = Y = Z`` for white; luminance stays as it is."""
+    return np.diag(1.0 / _white(illuminant))
+
+
+def _white(illuminant: str) -> np.ndarray:
+    grid = np.arange(380.0, 781.0, 5.0)
+    return tristimulus_weights(grid, illuminant=illuminant).white / 100.0
+
+
 def _picked(channels: Sequence[results.Channel], picks: Sequence[int]) -> Mixing:
     names = ", ".join(channels[k].name for k in picks)
     said = f"{names} of the fit are taken for R, G and B: no colorimetry"
@@ -148,9 +163,7 @@ def _xyz_to_srgb(illuminant: str) -> np.ndarray:
     colour = colour_science()
     space = colour.RGB_COLOURSPACES["sRGB"]
     primaries = colour.normalised_primary_matrix(space.primaries, space.whitepoint)
-    grid = np.arange(380.0, 781.0, 5.0)
-    white = tristimulus_weights(grid, illuminant=illuminant).white / 100.0
     adapt = colour.adaptation.matrix_chromatic_adaptation_VonKries(
-        white, primaries.sum(axis=1), transform="Bradford"
+        _white(illuminant), primaries.sum(axis=1), transform="Bradford"
     )
     return (np.linalg.inv(primaries) @ adapt).T

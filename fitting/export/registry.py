@@ -14,7 +14,16 @@ from fitting.expression import ModelError
 if TYPE_CHECKING:
     from fitting.export.target import Target
 
-TARGETS = ("mitsuba", "pbrt", "materialx", "openpbr", "gltf", "blender")
+TARGETS = (
+    "mitsuba",
+    "pbrt",
+    "materialx",
+    "openpbr",
+    "gltf",
+    "blender",
+    "radiance",
+    "klems",
+)
 
 
 @dataclass(frozen=True)
