@@ -165,8 +165,9 @@ def _draw_limit(axes: Axes, top: float) -> None:
     axes.axhline(1.0, color=GREY, lw=1.0, ls=(0, (6, 2)), zorder=1, label="energy limit")
     axes.axhspan(1.0, top, color=GREY, alpha=0.12, lw=0, zorder=0)
     axes.text(
-        1.0, 1.008, "more than arrives", fontsize=7, color=GREY, va="bottom", zorder=2
-    )
+        0.015, 0.99, "more than arrives", fontsize=7, color=GREY, va="top", zorder=2,
+        transform=axes.transAxes,
+    )  # fmt: skip
 
 
 def _measured(subject: Subject, side: Side, curve: _Curve) -> tuple[list[_Sum], str]:

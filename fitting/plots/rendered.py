@@ -48,6 +48,7 @@ class Compared:
 
     ``known (p,)``: more than half of the light is from directions with data near them.
     ``weight (p,)`` is that of a pixel in a mean over those that are known and lit.
+    ``coloured``: whether the channels make a colour, and not luminance only.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Compared:
     difference: np.ndarray
     known: np.ndarray
     weight: np.ndarray
+    coloured: bool
 
     @property
     def mean(self) -> float:
@@ -101,6 +103,7 @@ def compared(subject: Subject, scene: Scene, name: str, picture: Picture) -> Com
         difference=measure(scene, light).between(fit, whole)[:, 0],
         known=known,
         weight=weight / weight.sum(),
+        coloured=bool(np.linalg.matrix_rank(light.tristimulus) > 1),
     )
 
 
@@ -143,7 +146,7 @@ def draw_compared(
             "hatched: more than half of the light comes from directions without data near "
             "them, and does not count in the mean"
         )
-    if not _coloured(scenes):
+    if not any(one.coloured for one in scenes):
         said.append("these channels make no colour: luminance is shown")
     return finish(out, subject, said)
 
@@ -152,7 +155,9 @@ def _reference(data: Measurement) -> Reference:
     """The interpolation of a measurement, kept as long as that is."""
     if data not in _references:
         rows = select_rows(data, _LARGEST_THETA_DEG)
-        _references[data] = interpolate(rows, isotropic=data.symmetry != "anisotropic")
+        # What is not finite is looked for in the picture.
+        with np.errstate(over="ignore", invalid="ignore"):
+            _references[data] = interpolate(rows, isotropic=data.symmetry != "anisotropic")
     return _references[data]
 
 
@@ -189,7 +194,3 @@ def _extrapolated(
     veil = np.zeros((one.picture.size, 4))
     veil[~one.known & stripes] = (*(int(GREY[k : k + 2], 16) / 255 for k in (1, 3, 5)), 0.8)
     show(axes, one.picture, veil)
-
-
-def _coloured(scenes: Sequence[Compared]) -> bool:
-    return any(float(np.ptp(one.measured, axis=1).max()) > 1e-6 for one in scenes)
