@@ -135,7 +135,7 @@ def unsupported(stage: Stage, kept: Candidate) -> list[str]:
     noise = kept.error.noise
     out.append(
         f"the noise of the data alone makes {amount(stage, noise)} in this scene (mean); "
-        "it is taken off the errors"
+        "half of it is taken off the errors, in quadrature"
     )
     if noise > stage.measure.limits[0]:
         out.append("that is more than the tolerance: repeat the measurement to tell more")

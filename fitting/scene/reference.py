@@ -27,6 +27,7 @@ _NEIGHBOURS = {True: 64, False: 96}
 _SMOOTHINGS = (1e-2, 1.0, 1e1, 1e2, 1e3)
 _FIRST_SMOOTHING = 1.0
 _HELD_OUT = 400
+_ABOVE_NOISE = 3.0
 _NEARBY, _OVERSHOOT = 16, 0.25
 _MAD_TO_SIGMA = 1.4826
 _SCATTERED, _SCATTERED_RATIO = 40, 4.0
@@ -83,7 +84,10 @@ def interpolate(rows: Rows, *, isotropic: bool, seed: int = 0) -> Reference:
     points = chart.points(angles)
     value = _complete(rows)
     rng = np.random.default_rng(seed)
-    scale = 0.3 * np.maximum(np.median(np.abs(value), axis=0), 1e-12)
+    # A band that is mostly zero has the size of what it has.
+    size = np.maximum(np.median(np.abs(value), axis=0), 1e-3 * np.abs(value).mean(axis=0))
+    typical = np.where(size > 0, size, 1.0)
+    scale = 0.3 * typical
     held = rng.permutation(len(points))[: min(_HELD_OUT, len(points) // 10)]
     kept = np.setdiff1d(np.arange(len(points)), held)
     neighbours = min(_NEIGHBOURS[isotropic], len(kept))
@@ -93,8 +97,9 @@ def interpolate(rows: Rows, *, isotropic: bool, seed: int = 0) -> Reference:
 
     first = local(kept, np.arcsinh(value / scale), _FIRST_SMOOTHING)(points[held])
     relative, floor = _noise(value[held], scale * np.sinh(first))
-    typical = np.median(np.abs(value), axis=0)
-    scale = np.clip(floor / np.maximum(relative, 1e-3), 1e-2 * typical, typical) + 1e-300
+    # Where noise bends neither way: a few times its size, or values are biased low.
+    wanted = floor / np.clip(relative, 1e-3, 1.0 / _ABOVE_NOISE)
+    scale = np.clip(wanted, 1e-2 * typical, np.maximum(typical, _ABOVE_NOISE * floor))
     columns = np.arcsinh(value / scale)
     # By the light that they carry: at grazing angles values rise beyond all smoothness.
     light = (rows.geometry.cos_i * rows.geometry.cos_o)[held, None]

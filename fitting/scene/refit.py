@@ -57,7 +57,7 @@ def refit(
     for objective in objectives:
         weights = row_weights(stage, objective)
         tried.append(replace(options, objective=objective, weights=weights))
-    found = [_one(stage, expression, own) for own in tried]
+    found = [fitted(stage, expression, own) for own in tried]
     return min(found, key=lambda f: f.error.raw_mean)
 
 
@@ -70,7 +70,8 @@ def confirmed(
     return result, stage.error(found.model, result.values, precision=short)
 
 
-def _one(stage: Stage, expression: str, options: FitOptions) -> Refit:
+def fitted(stage: Stage, expression: str, options: FitOptions) -> Refit:
+    """A model fitted with these options alone."""
     model = Model(expression)
     options = with_given(stage.measurement, model, options)
     with jax.enable_x64(True):

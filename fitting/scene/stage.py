@@ -30,6 +30,8 @@ _ALBEDO_NODES = 4096
 _INCIDENCES = np.linspace(0.05, 0.95, 7)
 # Pixels of which more than this share of the light is extrapolated are not judged.
 _HALF = 0.5
+# Of the noise's variance, what is taken off a difference's square.
+_NOISE_SHARE = 0.5
 
 Progress = Callable[[str], None]
 
@@ -37,9 +39,10 @@ Progress = Callable[[str], None]
 class ImageError(msgspec.Struct, frozen=True):
     """How far a model is from the data in a scene, in the measure of its tolerance.
 
-    ``mean`` and ``percentile_95`` over the picture (``mean`` alone, the largest, of an
-    albedo), with what the data's noise adds taken off in quadrature: ``noise`` is the mean
-    that another measurement of the same surface would show. ``raw_mean`` and
+    ``mean`` and ``percentile_95`` over the picture (both the largest one, of an albedo),
+    with half of what the data's noise adds taken off in quadrature: ``noise`` is the mean
+    that another measurement of the same surface would show; a fit follows some of it, and
+    differences shall be overrated rather than underrated. ``raw_mean`` and
     ``raw_percentile_95`` are as they come. ``quadrature_error`` is the standard error of
     ``raw_mean`` that follows from the nodes. Colour differences are CIEDE2000.
     """
@@ -108,7 +111,7 @@ class Stage:
         first = self.statistics(image.first, self.of_data.first)
         second = self.statistics(image.second, self.of_data.second)
         pairs = zip(raw, noise, strict=True)
-        clean = [math.sqrt(max(a * a - b * b, 0.0)) for a, b in pairs]
+        clean = [math.sqrt(max(a * a - _NOISE_SHARE * b * b, 0.0)) for a, b in pairs]
         return ImageError(
             measure=self.measure.name, mean=clean[0], percentile_95=clean[1],
             raw_mean=raw[0], raw_percentile_95=raw[1], noise=noise[0],
