@@ -22,9 +22,14 @@ _WORST = 0.1
 
 def amount(stage: Stage, value: float) -> str:
     """An error in the measure of the scene."""
-    if stage.measure.name == COLOUR:
+    return amount_of(stage.measure.name, value)
+
+
+def amount_of(measure: str, value: float) -> str:
+    """An error in the measure of that name (`fitting.scene.difference`)."""
+    if measure == COLOUR:
         return f"{value:.2g}" if value < 10 else f"{value:.0f}"
-    if stage.measure.name == ALBEDO:
+    if measure == ALBEDO:
         return f"{value:.2g}"
     return f"{100 * value:.2g} %"
 

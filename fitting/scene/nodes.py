@@ -83,14 +83,15 @@ def _half(picture: Picture, emitter: Emitter, each: int, rng: np.random.Generato
     n_cosine = 0 if small else each
     n_mirror = each if by_mirror else 0
     n_retro = 0 if small else max(1, int(_RETRO * each))
+    pixels: list[np.ndarray] = []
     points: list[np.ndarray] = []
     towards: list[np.ndarray] = []
 
     def add(count: int, draw) -> None:
         if count:
-            pixel = np.repeat(np.arange(picture.size), count)
+            pixels.append(np.repeat(np.arange(picture.size), count))
             u = _shifted(4, count, picture.size, rng)
-            points.append(picture.points(pixel, u[:, 2:]))
+            points.append(picture.points(pixels[-1], u[:, 2:]))
             normal, view, _ = picture.normals_and_views(points[-1])
             towards.append(draw(normal, view, u[:, :2]))
 
@@ -101,10 +102,10 @@ def _half(picture: Picture, emitter: Emitter, each: int, rng: np.random.Generato
     n_highlight = each * picture.size if by_highlight else 0
     if n_highlight:
         found, light = _highlight_points(picture, sampler, n_highlight, rng)
+        pixels.append(picture.pixel_of(found))
         points.append(found)
         towards.append(light)
-    x, wi = np.concatenate(points), np.concatenate(towards)
-    pixel = picture.pixel_of(x)
+    pixel, x, wi = (np.concatenate(a) for a in (pixels, points, towards))
     normal, view, there = picture.normals_and_views(x)
     cos_i = np.sum(normal * wi, axis=1)
     cos_o = np.sum(normal * view, axis=1)
