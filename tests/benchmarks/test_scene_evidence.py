@@ -26,7 +26,7 @@ Line = Callable[[str], None]
 
 
 def test_cheap_models_are_kept_where_they_do_and_dear_ones_where_not(line: Line):
-    """Matte paint and lacquer, under a sky and a small lamp, from models of three prices."""
+    """Matte paint and lacquer under a sky and a small lamp; models of three prices."""
     truths = [t for t in TRUTHS if t.like in ("red clay", "glossy lacquer", "clear coat")]
     seen = [s for s in scenes(16) if s.name in ("overcast", "lamp", "off gloss")]
     models = ("lambert", "lambert + ggx", "lambert + 2*ggx")
