@@ -57,6 +57,19 @@ def pairs_of(model: Model, values: dict, ways: Sequence[Way], count: int = PAIRS
     return Pairs(from_components(*joined[:6]), joined[6])
 
 
+def widths(model: Model, values: dict) -> list[float]:
+    """About the half widths of the peaks of all lobes, in degrees of the detector.
+
+    A slope of the facets turns the reflected beam by twice its angle.
+    """
+    found = [p for way in model.ways for p in _peaks(model, values, way)]
+    return [
+        float(np.degrees((1.0 if p.axis is not None else 2.0) * np.arctan(w)))
+        for p in found
+        for w in (min(p.alpha_x, p.alpha_y),)
+    ]
+
+
 def _of_way(peaks: list[_Peak], way: Way, count: int) -> tuple[np.ndarray, ...]:
     u = _sequence(count)
     wi = _cosine(u[0], u[1])

@@ -23,6 +23,14 @@ TARGETS = (
     "blender",
     "radiance",
     "klems",
+    # Tables of databases and of optical design.
+    "merl",
+    "zemax",
+    "abg",
+    # Tables of this program.
+    "csv",
+    "hdf5",
+    "astm",
 )
 
 

@@ -107,7 +107,10 @@ def test_glass_and_opal_on_all_ways(mitsuba, tmp_path):
     assert error.max() < 2e-2
 
 
-@pytest.mark.parametrize("kind", ["ggx", "ggx(f82)", "beckmann"])
+@pytest.mark.parametrize(
+    "kind",
+    ["ggx", *(pytest.param(k, marks=pytest.mark.slow) for k in ("ggx(f82)", "beckmann"))],
+)
 def test_another_fresnel_term_is_near(mitsuba, tmp_path, kind):
     """What Mitsuba computes is what the report says: a sum of conductors."""
     result = result_of(f"lambert + {kind}", lambert__albedo=ALBEDO, **{
