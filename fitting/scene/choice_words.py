@@ -51,10 +51,12 @@ def sentence(stage: Stage, one: Candidate, kept: Candidate) -> str:
     ratio = one.operations / max(kept.operations, 1e-300)
     price = f"costs {ratio:.2g} times as much"
     change = f"changes this scene by {amount(stage, one.change)}"
-    missing = ""
-    if not one.within_tolerance:
-        missing = f", and misses the tolerance by {_missed(stage, one.error)}"
-    return f"{named(one)} {change} and {price}{missing}"
+    own, least = amount(stage, one.error.mean), amount(stage, kept.error.mean)
+    off = f"off by {own} " + ("as well" if own == least else f"instead of {least}")
+    if one.within_tolerance:
+        return f"{named(one)} {change} and {price}; it is {off}"
+    missed = _missed(stage, one.error)
+    return f"{named(one)} {change} and {price}; {off}, it misses the tolerance by {missed}"
 
 
 def verdict(
@@ -67,18 +69,23 @@ def verdict(
 ) -> str:
     """The answer in one sentence."""
     kept = candidates[chosen]
-    size = amount(stage, error.mean)
     if met:
-        cheaper = [c for c in candidates if c.operations < kept.operations]
-        only = ", and nothing cheaper is within it" if cheaper else ""
+        limits = [amount(stage, x) for x in stage.measure.limits]
+        allowed = " and ".join(limits) + (" are" if len(limits) > 1 else " is") + " allowed"
+        only = ""
+        if any(c.operations < kept.operations for c in candidates):
+            only = "; no cheaper candidate is"
+        elif len(candidates) > 1:
+            only = "; it is the cheapest candidate"
         return (
-            f"{named(kept)} is enough for {stage.scene.name}: off by {size} on average "
-            f"({_limits(stage)}){only}"
+            f"{named(kept)} is enough for {stage.scene.name}: off by "
+            f"{_both(stage, (error.mean, error.percentile_95))}, where {allowed} "
+            f"({_unit(stage)}){only}"
         )
     return (
-        f"nothing asked for is within the tolerance of {stage.scene.name} "
-        f"({_limits(stage)}); {named(kept)} comes nearest and misses it by "
-        f"{_missed(stage, error)}, most {_where(stage, found)}"
+        f"no candidate is within the tolerance of {stage.scene.name} ({_unit(stage)}: "
+        f"{_both(stage, stage.measure.limits)}); {named(kept)} comes nearest and misses it "
+        f"by {_missed(stage, error)}, most {_where(stage, found)}"
     )
 
 
@@ -94,7 +101,10 @@ def unseen(stage: Stage, found: Refit) -> list[str]:
     theta, power = incidences(stage.lights)
     reached = np.cumsum(power) / power.sum()
     low, high = np.degrees(np.interp([0.005, 0.995], reached, theta))
-    out.append(f"light arrives at {low:.0f} to {high:.0f} deg from the normal")
+    out.append(
+        f"99 % of the light arrives at {low:.0f} to {high:.0f} deg from the normal; what "
+        "the surface does at other angles of incidence does not show"
+    )
     finest = min(2 * e.half_angle if e.half_angle < 0.3 else e.finest
                  for e in stage.photometry.emitters)  # fmt: skip
     narrow = [
@@ -104,9 +114,9 @@ def unseen(stage: Stage, found: Refit) -> list[str]:
     ]
     if narrow:
         out.append(
-            f"the smallest light is {math.degrees(finest):.2g} deg wide, and shapes of "
-            f"lobes finer than alpha = {finest / GGX_WIDTH:.2g} cannot be told: "
-            f"{', '.join(narrow)} stands for anything below"
+            f"the smallest light is {math.degrees(finest):.2g} deg across, and lobes much "
+            f"narrower than alpha = {finest / GGX_WIDTH:.2g} look alike but at the edges "
+            f"of highlights: {', '.join(narrow)} might as well be narrower"
         )
     light = sum(np.abs(e.spectrum).sum(axis=0) for e in stage.photometry.emitters)
     light = np.asarray(light) * stage.photometry.counts
@@ -128,14 +138,15 @@ def unsupported(stage: Stage, kept: Candidate) -> list[str]:
     share = stage.extrapolated_share
     if share >= 0.0005:
         out.append(
-            f"{100 * share:.1f} % of the light in the picture comes by directions without "
-            "data near them; there the model is an extrapolation, and no difference is "
-            "judged"
+            f"{100 * share:.1f} % of the light in the picture comes by pairs of directions "
+            "without data near them; there the model is an extrapolation, and no "
+            "difference is judged"
         )
     left = 1.0 - float(stage.picture.weight @ (stage.extrapolated <= 0.5))
     if left >= 0.005:
         out.append(
-            f"{100 * left:.0f} % of the picture rests on such directions for the most"
+            f"{100 * left:.0f} % of the picture is lit mostly by such directions and not "
+            "judged at all"
         )
     noise = kept.error.noise
     out.append(
@@ -153,14 +164,18 @@ def unsupported(stage: Stage, kept: Candidate) -> list[str]:
     return out
 
 
-def _limits(stage: Stage) -> str:
-    limits = stage.measure.limits
-    name = "CIEDE2000" if stage.measure.name == COLOUR else stage.measure.name
-    if len(limits) == 1:
-        return f"tolerance: {name} {amount(stage, limits[0])}"
+def _unit(stage: Stage) -> str:
+    """What the scene's errors are."""
+    return "CIEDE2000" if stage.measure.name == COLOUR else stage.measure.name
+
+
+def _both(stage: Stage, errors: Sequence[float]) -> str:
+    """Mean and 95th percentile, or the one number of an albedo."""
+    if stage.measure.name == ALBEDO:
+        return f"{amount(stage, errors[0])} at most"
     return (
-        f"tolerance: {name} {amount(stage, limits[0])} on average, "
-        f"{amount(stage, limits[1])} for 95 % of the picture"
+        f"{amount(stage, errors[0])} on average and {amount(stage, errors[1])} at the 95th "
+        "percentile"
     )
 
 
