@@ -12,8 +12,10 @@ _COMMANDS = {
     "score": "Measure a fit result against a file, without fitting.",
     "reflectance": "Reflectances, transmittances and colours of a fit or of a file.",
     "tradeoff": "Measure speed against accuracy: of models, and of choices inside one.",
+    "choose": "Keep the cheapest model that a scene cannot tell from the data.",
     "plot": "Draw figures of a fit: slices, lobes, residuals, albedo, spectra, ...",
     "convert": "Write measurements in another format.",
+    "export": "Write a fit for a renderer, an optical design program, or as a table.",
     "models": "List the models, or describe one in full.",
     "formats": "List the file formats, or describe one in full.",
     "scene": "List the scenes that a model may be good enough for, or explain one.",
@@ -59,6 +61,16 @@ Examples:
   brdf tradeoff paint.astm -m lambert -m 'lambert + ggx' --inside none
   brdf tradeoff paint.astm --quick --cost fit --error albedo
 """,
+    "choose": """\
+Examples:
+  brdf choose                                   the bundled sample in a studio
+  brdf choose paint.astm --scene overcast       the fit goes to paint.overcast.fit.json
+  brdf choose paint.astm --scene mine.toml -m lambert -m 'lambert + ggx'
+  brdf choose paint.astm --scene sun --json > paint.sun.json
+
+A scene of your own: brdf scene studio --write mine.toml, then change it.
+Exit code 1 of this command: no candidate is within the tolerance.
+""",
     "plot": """\
 Examples:
   brdf plot --list                            what there is
@@ -69,6 +81,16 @@ Examples:
   brdf plot paint.fit.json --data moved/paint.astm
 """,
     "convert": "Example: brdf convert paint.astm paint.csv\n",
+    "export": """\
+Examples:
+  brdf export                                    the targets
+  brdf export paint.fit.json --to mitsuba        writes paint.xml
+  brdf export paint.fit.json --to mitsuba --as principled -o p.xml
+  brdf export paint.fit.json --to pbrt --spectral
+  brdf export paint.fit.json --to zemax --channels 550nm
+  brdf export paint.fit.json --to csv --theta-i 0:60:15 --theta-r 0:80:1
+  brdf export paint.fit.json --to gltf --json    what it says, for programs
+""",
     "models": "Examples: brdf models; brdf models ggx\n",
     "formats": "Examples: brdf formats; brdf formats csv\n",
     "scene": """\

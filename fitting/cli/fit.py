@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from fitting.cli import failures
 from fitting.cli.fit_choices import Choices
 from fitting.cli.flags import Flags
+from fitting.cli.target import check_target
 
 if TYPE_CHECKING:
     from fitting.cli.fit_settings import Job
@@ -44,7 +45,7 @@ def fit(
     paths = files or (_sample(),)
     target = _target(job, paths)
     if target is not None:
-        _check_target(target, paths[0])
+        check_target(target)
 
     from fitting.cli import reading, terminal
 
@@ -89,33 +90,6 @@ def _target(job: Job, paths: tuple[Path, ...]) -> Path | None:
     if job.output is not None:
         return job.output
     return None if job.json else Path(f"{'+'.join(map(stem, paths))}.fit.json")
-
-
-def _check_target(target: Path, source: Path) -> None:
-    """Before the work and not after it: can the result be written there?"""
-    import os
-
-    from fitting.result import ResultError, load_result
-
-    folder = target.parent
-    if not folder.is_dir():
-        raise failures.UsageError(f"{target}: the folder {folder} does not exist")
-    if target.is_dir():
-        raise failures.UsageError(f"{target}: is a folder; give the name of a file")
-    if not os.access(folder, os.W_OK):
-        raise failures.UsageError(
-            f"{target}: the folder {folder.resolve()} cannot be written to; choose another "
-            "place with -o"
-        )
-    if not target.exists():
-        return
-    try:
-        load_result(target)
-    except ResultError as error:
-        raise failures.UsageError(
-            f"{target}: exists and is not a fit result, so it is not overwritten; choose "
-            "another name with -o"
-        ) from error
 
 
 def _exit_code(result: FitResult) -> int:

@@ -1,0 +1,171 @@
+"""The answer of `brdf choose`: what is enough, what more would change, what is unknown."""
+
+from __future__ import annotations
+
+from rich.console import Console
+
+from fitting.cli import parameter_report
+from fitting.cli.flags import Flags
+from fitting.cli.terminal import bullet, heading, table
+from fitting.quantities import count, number
+from fitting.scene.choice import Choice
+from fitting.scene.choice_words import amount_of, named
+from fitting.scene.description import Scene
+from fitting.scene.difference import ALBEDO, COLOUR
+
+_MOST_WAVELENGTHS = 6
+
+
+def show(out: Console, found: Choice, scene: Scene, flags: Flags) -> None:
+    """Print everything, the verdict first, or with ``quiet`` the verdict alone."""
+    # A verdict may begin with a model's name, which stays as it is.
+    first = found.verdict[:1] if found.met else found.verdict[:1].upper()
+    verdict = first + found.verdict[1:]
+    if flags.quiet:
+        out.print(f"{verdict}.")
+        return
+    out.print(f"{verdict}.", style="bold")
+    if scene.description:
+        out.print(f"\n{found.scene}: {scene.description}", style="dim")
+    _candidates(out, found)
+    _requires(out, found)
+    _others(out, found)
+    _list(out, "What the scene cannot see", found.unseen)
+    _list(out, "What the data cannot support", found.unsupported)
+    if flags.verbose:
+        _details(out, found)
+        out.print(heading(f"Parameters of {named(found.candidates[found.chosen])}"))
+        parameter_report.show(out, found.result, everything=True)
+        for sentence in found.result.identifiability:
+            bullet(out, sentence)
+
+
+def _candidates(out: Console, found: Choice) -> None:
+    out.print(heading("Candidates, cheapest first"))
+    one_number = found.measure == ALBEDO
+    errors = ("error",) if one_number else ("error", "95 %")
+    rows = table("", "model", "cost", "parameters", *errors, "enough", "change", left=2)
+    rows.columns[1].no_wrap = True
+    kept = found.candidates[found.chosen]
+    for k, c in enumerate(found.candidates):
+        e = c.error
+        shown = (e.mean,) if one_number else (e.mean, e.percentile_95)
+        rows.add_row(
+            "*" if k == found.chosen else "",
+            named(c),
+            f"{c.operations / kept.operations:.2g}",
+            str(c.parameters),
+            *(amount_of(found.measure, v) for v in shown),
+            "yes" if c.within_tolerance else "no",
+            "-" if k == found.chosen else amount_of(found.measure, c.change),
+            style="bold" if k == found.chosen else "",
+        )
+    out.print(rows)
+    out.print(f"\n{_legend(found)}", style="dim")
+
+
+def _details(out: Console, found: Choice) -> None:
+    """How each candidate was fitted, and how well its error is known."""
+    out.print(heading("How it was found"))
+    rows = table(
+        "model", "objective", "precision", "error as it comes", "quadrature", left=3
+    )
+    rows.columns[0].no_wrap = True
+    for c in found.candidates:
+        rows.add_row(
+            named(c),
+            c.objective,
+            c.precision,
+            amount_of(found.measure, c.error.raw_mean),
+            amount_of(found.measure, c.error.quadrature_error),
+        )
+    out.print(rows)
+    out.print(
+        "\nobjective: the one of several whose fit comes nearest in the picture; error as "
+        "it comes: with the noise of the data; quadrature: its standard error",
+        style="dim",
+    )
+
+
+def _legend(found: Choice) -> str:
+    difference = {
+        COLOUR: "colour difference CIEDE2000, mean and 95th percentile over the picture",
+        ALBEDO: "largest albedo error over angles and channels",
+    }.get(found.measure, "relative error of radiance, mean and 95th percentile")
+    return (
+        "* kept; cost: counted operations of an evaluation, relative to the kept model; "
+        f"error: {difference}, from the data, without their noise; change: "
+        f"{'largest' if found.measure == ALBEDO else 'mean'} difference from the picture "
+        "of the kept model"
+    )
+
+
+def _requires(out: Console, found: Choice) -> None:
+    kept = found.candidates[found.chosen]
+    out.print(heading("What the scene requires" if found.met else "What comes nearest"))
+    bullet(
+        out,
+        f"{named(kept)}: {count(kept.parameters, 'free parameter')}, "
+        f"{kept.operations:.0f} operations per evaluation in all channels",
+    )
+    if kept.precision == "float32":
+        bullet(out, "single precision (float32): double makes no difference here")
+    else:
+        bullet(out, "double precision (float64): single makes a difference here")
+    if len(found.result.channels) > 1:
+        bullet(
+            out,
+            "a shape for each channel"
+            if kept.per_channel_shape
+            else "one shape for all channels",
+        )
+    _wavelengths(out, found)
+    if not found.result.solver.converged:
+        bullet(out, f"warning: {found.result.solver.sentence}")
+
+
+def _wavelengths(out: Console, found: Choice) -> None:
+    """How many wavelengths coefficients are needed at, and what fewer would do."""
+    if not found.wavelengths:
+        return
+    enough = [w for w in found.wavelengths if w.within_tolerance]
+    few = [w for w in found.wavelengths if not w.within_tolerance]
+    n = len(found.result.channels)
+    text = f"coefficients at all {n} wavelengths"
+    if enough:
+        least = enough[-1]
+        text = (
+            f"coefficients at {len(least.wavelengths_nm)} of {n} wavelengths "
+            f"({_listed(least.wavelengths_nm)}), linear between them: off by "
+            f"{amount_of(found.measure, least.error.mean)}"
+        )
+    for w in few[:1]:
+        off = amount_of(found.measure, w.error.mean)
+        listed = _listed(w.wavelengths_nm)
+        text += f"; at {len(w.wavelengths_nm)} ({listed}) it would be off by {off}"
+    bullet(out, text)
+
+
+def _listed(wavelengths: list[float]) -> str:
+    shown = [number(w) for w in wavelengths]
+    if len(shown) > _MOST_WAVELENGTHS:
+        shown = [*shown[:3], "...", shown[-1]]
+    return f"{', '.join(shown)} nm"
+
+
+def _others(out: Console, found: Choice) -> None:
+    """A sentence each on the candidates that are not kept."""
+    kept = found.candidates[found.chosen]
+    others = [c for k, c in enumerate(found.candidates) if k != found.chosen]
+    dearer = [c.sentence for c in others if c.operations >= kept.operations]
+    cheaper = [c.sentence for c in others if c.operations < kept.operations]
+    _list(out, "What dearer candidates would change and cost", dearer)
+    _list(out, "What cheaper candidates would miss", cheaper)
+
+
+def _list(out: Console, title: str, sentences: list[str]) -> None:
+    if not sentences:
+        return
+    out.print(heading(title))
+    for sentence in sentences:
+        bullet(out, sentence)
