@@ -7,6 +7,9 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+# Steps may take minutes each, and speed is forgotten after 30 s unless told.
+_WHOLE_RUN_S = 86_400.0
+
 
 class Work:
     """A bar on a terminal, one line per thing that is done elsewhere.
@@ -26,6 +29,7 @@ class Work:
                 TimeRemainingColumn(),
                 console=console,
                 transient=True,
+                speed_estimate_period=_WHOLE_RUN_S,
             )
             self._task = self._progress.add_task("starting", total=total)
 
