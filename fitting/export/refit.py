@@ -43,9 +43,13 @@ def refit(
         data, value=value, valid=np.isfinite(value), channels=surface.channels
     )
     own = Model(expression)
-    say(f"refitting {own.expression} to {surface.model.expression}")
+    say(f"refitting {surface.model.expression} by {own.expression}")
+
+    def detail(what: str) -> None:
+        say(f"{own.expression}: {what}")
+
     found = fit(
         data, own, cross_validate=False, starts=_STARTS, reciprocity=0.0,
-        fix=dict(fix or {}), tie=dict(tie or {}), progress=say,
+        fix=dict(fix or {}), tie=dict(tie or {}), progress=detail,
     )  # fmt: skip
     return Lobes(own.expression, found.values, own.expression)
