@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -39,6 +41,7 @@ LADDER = (
 STARTS = 4
 # Of the tolerance: what single precision may add, and float64 costs as against float32.
 _PRECISE, _DOUBLE = 0.02, 2.0
+_MOST_THREADS = 8
 
 Say = Callable[[str], None]
 
@@ -82,10 +85,7 @@ def choose_for_scene(
         told = scene if isinstance(scene, Scene) else load_scene(scene)
         stage = set_stage(measurement, told, progress=say)
     options = FitOptions(**{"starts": STARTS, **settings})
-    tried: list[_Tried] = []
-    for k, model in enumerate(models):
-        say(f"refitting {model} ({k + 1} of {len(models)})")
-        tried.append(_try(stage, model, options))
+    tried = _all(stage, models, options, say)
     best = _cheapest(tried)
     if measurement.n_channels > 1 and not options.per_channel_shape:
         for one in _worth_a_shape_per_channel(tried, best, measurement.n_channels):
@@ -116,6 +116,24 @@ def choose_for_scene(
         extrapolated_share=stage.extrapolated_share,
         result=result,
     )
+
+
+def _all(
+    stage: Stage, models: Sequence[str], options: FitOptions, say: Say
+) -> list[_Tried]:
+    """Every model; most of the time is the compiler's, which runs beside itself."""
+    told = itertools.count(1)
+
+    def one(model: str) -> _Tried:
+        say(f"refitting {model} ({next(told)} of {len(models)})")
+        return _try(stage, model, options)
+
+    workers = min(len(models), os.cpu_count() or 1, _MOST_THREADS)
+    pool = ThreadPoolExecutor(workers)
+    try:
+        return list(pool.map(one, models))
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _try(stage: Stage, expression: str, options: FitOptions) -> _Tried:
