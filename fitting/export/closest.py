@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from fitting.export.parts import Lobes
-from fitting.export.report import residual
+from fitting.export.report import Residual, residual
 from fitting.export.surface import Surface
 from fitting.models import Way
 
-# Relative RMS up to which nothing else is tried: each trial is a fit.
+# Relative RMS of log(1 + f cos) up to which nothing else is tried: each trial is a fit.
 CLOSE = 0.05
 
 
@@ -39,16 +39,16 @@ def closest(surface: Surface, candidates: Iterable[Candidate]) -> Candidate:
     Candidates come one by one, since to make one may take a fit. Those passed over are
     named in the remarks.
     """
-    tried: list[tuple[float, Candidate]] = []
+    tried: list[tuple[Residual, Candidate]] = []
     for candidate in candidates:
-        off = residual(surface, candidate.representation, candidate.ways).relative_rms
+        off = residual(surface, candidate.representation, candidate.ways)
         tried.append((off, candidate))
-        if candidate.final or off <= CLOSE:
+        if candidate.final or off.relative_rms_log1p <= CLOSE:
             break
-    tried.sort(key=lambda item: item[0])
+    tried.sort(key=lambda item: item[0].relative_rms_log1p)
     best = tried[0][1]
     others = tuple(
-        f"{c.name} ({c.representation.words}) was tried as well: relative RMS {off:.2g}"
+        f"{c.name} ({c.representation.words}) was tried as well: {off}"
         for off, c in tried[1:]
     )
     return dataclasses.replace(best, remarks=(*best.remarks, *others))

@@ -9,6 +9,7 @@ from fitting.export.pairs import PAIRS, pairs_of
 from fitting.export.surface import Surface
 from fitting.export.target import Product, Representation
 from fitting.models import Way
+from fitting.quantities import percent
 
 # Below this the two are one formula, evaluated with other roundings.
 EXACT = 1e-9
@@ -18,13 +19,18 @@ class Residual(msgspec.Struct, frozen=True):
     """Distance of the exported from the fitted BSDF, over all pairs of directions.
 
     ``relative_rms`` is the root of ``int int (g - f)^2 cos_i cos_o`` over that of ``int
-    int f^2 cos_i cos_o``, all channels together, up to 85 degrees from the normal.
+    int f^2 cos_i cos_o``, all channels together, up to 85 degrees from the normal; what
+    shines at grazing angles decides it. ``relative_rms_log1p`` is the same of ``log(1 + f
+    cos_o)``, which the fits make small and by which a target's model is chosen, and
+    ``typical`` the median of ``|g / f - 1|`` in the same measure.
     ``largest`` is the largest ``|g - f|`` of ``pairs`` quasi-random pairs, half of them
     around the peaks, in 1/sr, with ``fitted`` and ``exported`` there, the angles in degrees
     and the channel.
     """
 
     relative_rms: float
+    relative_rms_log1p: float
+    typical: float
     largest: float
     fitted: float
     exported: float
@@ -45,10 +51,12 @@ class Residual(msgspec.Struct, frozen=True):
             return "none, it is the formula of the fit"
         across = np.remainder(self.phi_r_deg - self.phi_i_deg, 360.0)
         return (
-            f"relative RMS {self.relative_rms:.2g} (cosine-weighted, up to 85 deg); "
-            f"largest deviation {self.largest:.3g} per sr ({self.exported:.4g} for "
-            f"{self.fitted:.4g}, {self.channel}) at theta_i {self.theta_i_deg:.1f}, "
-            f"theta_r {self.theta_r_deg:.1f}, phi_r - phi_i {across:.1f} deg"
+            f"typically {percent(self.typical)} (median), relative RMS "
+            f"{self.relative_rms:.2g} (cosine-weighted, up to 85 deg), of log(1 + f cos) "
+            f"{self.relative_rms_log1p:.2g}; largest deviation {self.largest:.3g} per sr "
+            f"({self.exported:.4g} for {self.fitted:.4g}, {self.channel}) at theta_i "
+            f"{self.theta_i_deg:.1f}, theta_r {self.theta_r_deg:.1f}, phi_r - phi_i "
+            f"{across:.1f} deg"
         )
 
 
@@ -110,8 +118,6 @@ def residual(
     at = pairs_of(surface.model, surface.result.values, ways, pairs)
     f, g = surface(at.geometry), representation(at.geometry)
     weight = at.weight[:, None]
-    norm = float(np.sum(weight * f * f))
-    off = float(np.sum(weight * (g - f) ** 2))
     row, channel = np.unravel_index(int(np.argmax(np.abs(g - f))), f.shape)
     q = at.geometry
     angles = [
@@ -123,8 +129,12 @@ def residual(
             (q.woy, q.wox),
         )
     ]
+    cosine = np.abs(np.asarray(at.geometry.cos_o))[:, None]
+    logs = [np.log1p(np.maximum(v, 0.0) * cosine) for v in (f, g)]
     return Residual(
-        relative_rms=float(np.sqrt(off / norm)) if norm > 0 else float(off > 0),
+        relative_rms=_relative(weight, f, g),
+        relative_rms_log1p=_relative(weight, *logs),
+        typical=_median(np.abs(g - f), np.abs(f), weight),
         largest=float(np.abs(g - f)[row, channel]),
         fitted=float(f[row, channel]),
         exported=float(g[row, channel]),
@@ -133,3 +143,20 @@ def residual(
         channel=surface.channels[channel].name,
         pairs=len(at.weight),
     )  # fmt: skip
+
+
+def _relative(weight: np.ndarray, f: np.ndarray, g: np.ndarray) -> float:
+    norm = float(np.sum(weight * f * f))
+    off = float(np.sum(weight * (g - f) ** 2))
+    return float(np.sqrt(off / norm)) if norm > 0 else float(off > 0)
+
+
+def _median(off: np.ndarray, size: np.ndarray, weight: np.ndarray) -> float:
+    """Weighted median of relative deviations; of black surfaces none."""
+    some = size > 0
+    if not some.any():
+        return float(np.max(off, initial=0.0) > 0)
+    ratio, w = off[some] / size[some], np.broadcast_to(weight, off.shape)[some]
+    order = np.argsort(ratio)
+    total = np.cumsum(w[order])
+    return float(ratio[order][np.searchsorted(total, 0.5 * total[-1])])

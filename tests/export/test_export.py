@@ -165,6 +165,8 @@ def test_the_distance_of_two_known_surfaces():
     twice = sum_of([("lambert", {"albedo": np.array([0.4, 0.8, 0.6])})])
     found = residual(surface, twice)
     assert found.relative_rms == pytest.approx(1.0, rel=1e-12)
+    assert found.typical == pytest.approx(1.0, rel=1e-12)
+    assert 0.9 < found.relative_rms_log1p < 1.0
     assert found.largest == pytest.approx(0.4 / np.pi, rel=1e-12)
     assert found.channel == "G"
     assert not found.exact
