@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,12 +9,11 @@ import numpy as np
 from fitting.quantities import count
 from fitting.scene.choice import Candidate
 from fitting.scene.difference import ALBEDO, COLOUR
+from fitting.scene.explain import explain
 from fitting.scene.refit import Refit
 from fitting.scene.render import render
 from fitting.scene.stage import ImageError, Stage, incidences
 
-# Full width of a GGX lobe at half height, in plane at normal incidence: 2.57 alpha rad.
-GGX_WIDTH = 2.57
 _UNUSED, _DARK = 0.03, 1e-3
 _WORST = 0.1
 
@@ -53,6 +51,8 @@ def sentence(stage: Stage, one: Candidate, kept: Candidate) -> str:
     change = f"changes this scene by {amount(stage, one.change)}"
     own, least = amount(stage, one.error.mean), amount(stage, kept.error.mean)
     off = f"off by {own} " + ("as well" if own == least else f"instead of {least}")
+    if one.error.mean == 0:
+        off = "no further off than the noise of the data"
     if one.within_tolerance:
         return f"{named(one)} {change} and {price}; it is {off}"
     missed = _missed(stage, one.error)
@@ -101,22 +101,22 @@ def unseen(stage: Stage, found: Refit) -> list[str]:
     theta, power = incidences(stage.lights)
     reached = np.cumsum(power) / power.sum()
     low, high = np.degrees(np.interp([0.005, 0.995], reached, theta))
+    span = f"{low:.0f} to {high:.0f}" if high - low >= 1 else f"about {low:.0f}"
     out.append(
-        f"99 % of the light arrives at {low:.0f} to {high:.0f} deg from the normal; what "
-        "the surface does at other angles of incidence does not show"
+        f"99 % of the light arrives at {span} deg from the normal; what the surface does "
+        "at other angles of incidence does not show"
     )
-    finest = min(2 * e.half_angle if e.half_angle < 0.3 else e.finest
-                 for e in stage.photometry.emitters)  # fmt: skip
+    finest = min(explain(stage.scene).lights, key=lambda light: light.size_deg)
     narrow = [
         f"{label}.{name} = {alpha:.3g}"
         for label, name, alpha in _widths(found)
-        if alpha < finest / GGX_WIDTH
+        if alpha < finest.smallest_alpha
     ]
     if narrow:
         out.append(
-            f"the smallest light is {math.degrees(finest):.2g} deg across, and lobes much "
-            f"narrower than alpha = {finest / GGX_WIDTH:.2g} look alike but at the edges "
-            f"of highlights: {', '.join(narrow)} might as well be narrower"
+            f"no light has details finer than {finest.size_deg:.3g} deg ({finest.name}), "
+            f"and lobes much narrower than alpha = {finest.smallest_alpha:.2g} look alike "
+            f"but at the edges of highlights: {', '.join(narrow)} might as well be narrower"
         )
     light = sum(np.abs(e.spectrum).sum(axis=0) for e in stage.photometry.emitters)
     light = np.asarray(light) * stage.photometry.counts
