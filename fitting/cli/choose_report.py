@@ -6,12 +6,13 @@ from rich.console import Console
 
 from fitting.cli import parameter_report
 from fitting.cli.flags import Flags
-from fitting.cli.terminal import bullet, heading, table
+from fitting.cli.terminal import bullet, heading, paragraph, table
 from fitting.quantities import count, number
 from fitting.scene.choice import Choice
 from fitting.scene.choice_words import amount_of, named
 from fitting.scene.description import Scene
 from fitting.scene.difference import ALBEDO, COLOUR
+from fitting.scene.stage import ImageError
 
 _MOST_WAVELENGTHS = 6
 
@@ -22,11 +23,12 @@ def show(out: Console, found: Choice, scene: Scene, flags: Flags) -> None:
     first = found.verdict[:1] if found.met else found.verdict[:1].upper()
     verdict = first + found.verdict[1:]
     if flags.quiet:
-        out.print(f"{verdict}.")
+        paragraph(out, f"{verdict}.")
         return
-    out.print(f"{verdict}.", style="bold")
+    paragraph(out, f"{verdict}.", style="bold")
     if scene.description:
-        out.print(f"\n{found.scene}: {scene.description}", style="dim")
+        out.print()
+        paragraph(out, f"{found.scene}: {scene.description}", style="dim")
     _candidates(out, found)
     _requires(out, found)
     _others(out, found)
@@ -61,7 +63,9 @@ def _candidates(out: Console, found: Choice) -> None:
             style="bold" if k == found.chosen else "",
         )
     out.print(rows)
-    out.print(f"\n{_legend(found)}", style="dim")
+    out.print()
+    for text in _legend(found):
+        bullet(out, text, style="dim")
 
 
 def _details(out: Console, found: Choice) -> None:
@@ -80,23 +84,29 @@ def _details(out: Console, found: Choice) -> None:
             amount_of(found.measure, c.error.quadrature_error),
         )
     out.print(rows)
-    out.print(
-        "\nobjective: the one of several whose fit comes nearest in the picture; error as "
-        "it comes: with the noise of the data; quadrature: its standard error",
+    out.print()
+    paragraph(
+        out,
+        "objective: the one of several whose fit comes nearest in the picture; error as it "
+        "comes: with the noise of the data; quadrature: its standard error",
         style="dim",
     )
 
 
-def _legend(found: Choice) -> str:
-    difference = {
-        COLOUR: "colour difference CIEDE2000, mean and 95th percentile over the picture",
-        ALBEDO: "largest albedo error over angles and channels",
-    }.get(found.measure, "relative error of radiance, mean and 95th percentile")
+def _legend(found: Choice) -> tuple[str, ...]:
+    error = {
+        COLOUR: "error, 95 %: colour difference CIEDE2000 of the pictures with the model "
+        "and with the data, its mean and 95th percentile",
+        ALBEDO: "error: largest difference of the albedos of model and data",
+    }.get(
+        found.measure,
+        "error, 95 %: relative difference of radiance in the pictures with the model and "
+        "with the data, its mean and 95th percentile",
+    )
     return (
-        "* kept; cost: counted operations of an evaluation, relative to the kept model; "
-        f"error: {difference}, from the data, without their noise; change: "
-        f"{'largest' if found.measure == ALBEDO else 'mean'} difference from the picture "
-        "of the kept model"
+        "cost: counted operations of an evaluation, relative to the model that is kept (*)",
+        f"{error}, without the noise of the data",
+        "change: the same difference, in the mean, from the model that is kept",
     )
 
 
@@ -109,10 +119,11 @@ def _requires(out: Console, found: Choice) -> None:
         f"{kept.operations:.0f} operations per evaluation in all channels",
     )
     if kept.precision == "float32":
-        bullet(out, "single precision (float32): double makes no difference here")
+        bullet(out, "single precision (float32): rounding does not show")
     else:
-        bullet(out, "double precision (float64): single makes a difference here")
-    if len(found.result.channels) > 1:
+        bullet(out, "double precision (float64): in float32 rounding would show")
+    shaped = any(p.kind == "shape" for p in found.result.parameters)
+    if shaped and len(found.result.channels) > 1:
         bullet(
             out,
             "a shape for each channel"
@@ -122,6 +133,13 @@ def _requires(out: Console, found: Choice) -> None:
     _wavelengths(out, found)
     if not found.result.solver.converged:
         bullet(out, f"warning: {found.result.solver.sentence}")
+    energy = found.result.energy
+    if energy.max_albedo > 1:
+        bullet(
+            out,
+            f"warning: the model reflects more than arrives, up to {energy.max_albedo:.3f} "
+            f"of it, at {energy.theta_deg:g} deg, {energy.channel}",
+        )
 
 
 def _wavelengths(out: Console, found: Choice) -> None:
@@ -134,16 +152,26 @@ def _wavelengths(out: Console, found: Choice) -> None:
     text = f"coefficients at all {n} wavelengths"
     if enough:
         least = enough[-1]
+        at = f"{len(least.wavelengths_nm)} of {n} wavelengths"
         text = (
-            f"coefficients at {len(least.wavelengths_nm)} of {n} wavelengths "
-            f"({_listed(least.wavelengths_nm)}), linear between them: off by "
-            f"{amount_of(found.measure, least.error.mean)}"
+            f"coefficients at {at} ({_listed(least.wavelengths_nm)}), linear between them: "
+            f"off by {_both(found, least.error)}"
         )
     for w in few[:1]:
-        off = amount_of(found.measure, w.error.mean)
-        listed = _listed(w.wavelengths_nm)
-        text += f"; at {len(w.wavelengths_nm)} ({listed}) it would be off by {off}"
+        text += (
+            f"; at {len(w.wavelengths_nm)} ({_listed(w.wavelengths_nm)}) by "
+            f"{_both(found, w.error)}, too much"
+        )
     bullet(out, text)
+
+
+def _both(found: Choice, error: ImageError) -> str:
+    """Mean and 95th percentile, or the one number of an albedo."""
+    mean = amount_of(found.measure, error.mean)
+    if found.measure == ALBEDO:
+        return mean
+    high = amount_of(found.measure, error.percentile_95)
+    return f"{mean} on average and {high} at the 95th percentile"
 
 
 def _listed(wavelengths: list[float]) -> str:

@@ -55,13 +55,23 @@ def heading(text: str) -> Text:
     return Text(f"\n{text}", style="bold")
 
 
+def paragraph(out: Console, text: str, style: str = "") -> None:
+    """Print a sentence or more, with lines broken between words."""
+    out.print(_filled(out, text), style=style, soft_wrap=True)
+
+
 def bullet(out: Console, text: str, style: str = "") -> None:
     """Print a sentence with a mark, whose further lines are indented."""
+    out.print(_filled(out, text, "- ", "  "), style=style, soft_wrap=True)
+
+
+def _filled(out: Console, text: str, first: str = "", further: str = "") -> str:
+    # A percent sign stays with its number.
     lines = textwrap.fill(
-        text,
+        text.replace(" %", "\xa0%"),
         max(out.width, 20),
-        initial_indent="- ",
-        subsequent_indent="  ",
+        initial_indent=first,
+        subsequent_indent=further,
         break_on_hyphens=False,
     )
-    out.print(lines, style=style, soft_wrap=True)
+    return lines.replace("\xa0", " ")
