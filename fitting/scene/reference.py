@@ -32,7 +32,7 @@ _NEARBY, _OVERSHOOT = 16, 0.25
 _MAD_TO_SIGMA = 1.4826
 _SCATTERED, _SCATTERED_RATIO = 40, 4.0
 _FAR = 1.5
-_BEYOND = math.radians(2.5)
+_BEYOND = math.radians(1.0)
 _GRID = {True: (64, 31, 13), False: (25, 25, 13, 13)}
 
 
@@ -53,7 +53,7 @@ class Reference:
     _scale: np.ndarray
     _tree: KDTree
     _far: float
-    _steepest: float
+    _steepest: np.ndarray
 
     def value(self, g: Geometry, *, noisy: bool = False) -> np.ndarray:
         """BRDF ``(n, c)``, 1/sr. ``noisy``: as another measurement of the same surface with
@@ -64,9 +64,9 @@ class Reference:
 
     def supported(self, g: Geometry) -> np.ndarray:
         """``(n,)`` True where samples are near; elsewhere `value` is extrapolated."""
-        steepest = np.arccos(np.clip(np.minimum(g.cos_i, g.cos_o), -1.0, 1.0))
+        angles = _steepness(g)
         distance, _ = self._tree.query(self.chart.points(half_angles(g)))
-        return (distance <= self._far) & (steepest <= self._steepest + _BEYOND)
+        return (distance <= self._far) & np.all(angles <= self._steepest + _BEYOND, axis=0)
 
     def nearest(self, g: Geometry) -> np.ndarray:
         """``(n,)`` the row that is nearest to each pair of directions."""
@@ -120,12 +120,19 @@ def interpolate(rows: Rows, *, isotropic: bool, seed: int = 0) -> Reference:
     )
     tree = KDTree(points)
     distance = tree.query(points, k=2)[0][:, 1]
-    steepest = np.arccos(np.minimum(rows.geometry.cos_i, rows.geometry.cos_o)).max()
+    # Towards grazing values change fast, and nothing is known beyond the steepest rows.
+    steepest = _steepness(rows.geometry).max(axis=1, keepdims=True)
     return Reference(
         chart=chart, smoothing=_SMOOTHINGS[best], relative_noise=relative, floor=floor,
         _table=values, _noise_table=of_noise, _scale=scale, _tree=tree,
-        _far=_FAR * max(1.0, float(np.percentile(distance, 95))), _steepest=float(steepest),
+        _far=_FAR * max(1.0, float(np.percentile(distance, 95))), _steepest=steepest,
     )  # fmt: skip
+
+
+def _steepness(g: Geometry) -> np.ndarray:
+    """The larger and the smaller angle to the normal of both directions, ``(2, n)``."""
+    cosines = np.stack([np.minimum(g.cos_i, g.cos_o), np.maximum(g.cos_i, g.cos_o)])
+    return np.arccos(np.clip(cosines, -1.0, 1.0))
 
 
 def _chart_of(rows: Rows, a: HalfAngles, isotropic: bool) -> Chart:
