@@ -56,17 +56,8 @@ def show(out: Console, found: Tradeoff, flags: Flags) -> None:
 
 
 def _evaluation(out: Console, found: Tradeoff) -> None:
-    rows = table(
-        "",
-        "model",
-        "operations",
-        "flops",
-        "transc.",
-        "f32, ns",
-        "f64, ns",
-        "one, us",
-        left=2,
-    )
+    heads = ("ops", "flops", "transc.", "f32, ns", "f64, ns", "one, us")
+    rows = table("", "model", *heads, left=2)
     rows.columns[1].no_wrap = True
     for c in _by_cost(found):
         e = c.evaluation
@@ -243,6 +234,9 @@ def _spread(s: Spread) -> str:
         return number(s.median, 3)
     digits = -int(f"{half:.0e}".partition("e")[2])
     shown = max(digits, 0)
+    # What spreads by less than one in a hundred needs no more digits than that.
+    if half < 0.01 * s.median:
+        return f"{number(s.median, 3)} ± {number(half, 1)}"
     return f"{round(s.median, digits):.{shown}f} ± {round(half, digits):.{shown}f}"
 
 

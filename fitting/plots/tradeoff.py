@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from fitting.quantities import percent
-from fitting.tradeoff.table import COST_WORDS, Candidate, ErrorAxis, Tradeoff
+from fitting.tradeoff.table import COST_WORDS, Candidate, ErrorAxis, Tradeoff, judged
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 _ERRORS: dict[ErrorAxis, str] = {
     "held-out": "{objective} on angles of incidence not fitted, typical RMS",
@@ -19,7 +20,9 @@ _ERRORS: dict[ErrorAxis, str] = {
 }
 _TIMED = ("float32", "float64", "fit")
 # Size of type in points, and the mean width of a character over it.
-_LABEL, _CHARACTER = 7.5, 0.6
+_LABEL, _CHARACTER = 8.0, 0.62
+
+Box = tuple[float, float, float, float]
 
 
 class Point(NamedTuple):
@@ -34,16 +37,18 @@ def draw(table: Tradeoff, axes: Axes | None = None) -> Figure:
     """Draw the table into some axes, or into a new figure; returns the figure.
 
     Both axes are logarithmic. Filled circles on a stepped line are the front, open squares
-    what is dominated; horizontal lines are the noise of the data by each account that they
-    allow. Measured times have bars from quartile to quartile.
+    what is dominated, by the axes that the table now has, numbered from cheap to dear;
+    horizontal lines are the noise of the data by each account that they allow. Measured
+    times have bars from quartile to quartile.
     """
     from matplotlib.figure import Figure
 
     from fitting.plots.style import styled
 
+    table = judged(table)
     with styled():
         if axes is None:
-            figure = Figure(figsize=(7.5, 5.0), layout="constrained")
+            figure = Figure(figsize=(8.5, 4.6), layout="constrained")
             axes = figure.add_subplot()
         points = _points(table)
         noise = _noise(axes, table)
@@ -56,10 +61,11 @@ def draw(table: Tradeoff, axes: Axes | None = None) -> Figure:
         found = axes.get_figure(root=True)
         if not isinstance(found, Figure):
             raise ValueError("the axes belong to no figure")
-        found.legend(loc="outside lower left", ncols=2)
-        # The layout tells where labels have room.
+        lines = axes.get_legend_handles_labels()[0]
+        found.legend(handles=[*_names(points), *lines], loc="outside right upper")
+        # The layout tells where numbers have room.
         found.draw_without_rendering()
-        _labels(axes, points)
+        _numbers(axes, points)
     return found
 
 
@@ -81,7 +87,7 @@ def _limits(axes: Axes, points: list[Point], noise: list[float]) -> None:
     error = [*(p.error for p in points), *noise] or [1.0]
     wide = max(max(cost) / min(cost), 4.0)
     high = max(max(error) / min(error), 4.0)
-    set_log_scale(axes.xaxis, min(cost) / wide**0.08, max(cost) * min(wide**0.3, 6.0))
+    set_log_scale(axes.xaxis, min(cost) / wide**0.08, max(cost) * wide**0.08)
     set_log_scale(axes.yaxis, min(error) / high**0.12, max(error) * high**0.15)
 
 
@@ -95,56 +101,69 @@ def _candidates(axes: Axes, table: Tradeoff, points: list[Point]) -> None:
             [p.cost for p in front], [p.error for p in front], drawstyle="steps-post",
             color=BLUE, linewidth=1.2, zorder=2,
         )  # fmt: skip
-    styles = (
-        (front, "o", BLUE, BLUE, "Pareto front"),
-        (others, "s", VERMILLION, "white", "dominated"),
-    )
-    for group, marker, colour, fill, label in styles:
+    for group, marker, colour, fill in (
+        (front, "o", BLUE, BLUE),
+        (others, "s", VERMILLION, "white"),
+    ):
         if not group:
             continue
         axes.errorbar(
             [p.cost for p in group], [p.error for p in group],
             xerr=_bars([p.candidate for p in group], table), linestyle="none",
             marker=marker, markersize=6.0, color=colour, markerfacecolor=fill,
-            markeredgecolor=colour,
-            ecolor=GREY, elinewidth=0.8, label=label, zorder=3,
+            markeredgecolor=colour, ecolor=GREY, elinewidth=0.8, zorder=3,
         )  # fmt: skip
 
 
-def _labels(axes: Axes, points: list[Point]) -> None:
-    """Names beside the points, where they cover neither each other nor a point."""
+def _names(points: list[Point]) -> list[Line2D]:
+    """Legend entries that say which number is which model, and what the marks mean."""
+    from matplotlib.lines import Line2D
+
+    from fitting.plots.style import BLUE, VERMILLION
+
+    def entry(label: str, on_front: bool) -> Line2D:
+        mark, colour = ("o", BLUE) if on_front else ("s", VERMILLION)
+        fill = colour if on_front else "white"
+        return Line2D(
+            [], [], linestyle="none", marker=mark, markersize=5.0, color=colour,
+            markerfacecolor=fill, label=label,
+        )  # fmt: skip
+
+    out = [
+        entry(f"{k}  {p.candidate.model}", p.candidate.on_front)
+        for k, p in enumerate(points, start=1)
+    ]
+    kinds = {p.candidate.on_front for p in points}
+    return out + [
+        Line2D([], [], linestyle="none", label=said)
+        for on_front, said in ((True, "filled: Pareto front"), (False, "open: dominated"))
+        if on_front in kinds
+    ]
+
+
+def _numbers(axes: Axes, points: list[Point]) -> None:
+    """Numbers beside the points, where they cover neither each other nor a point."""
     from fitting.plots.style import INK
 
     at = axes.transData.transform([(p.cost, p.error) for p in points])
-    points_per_pixel = 72.0 / axes.figure.dpi
-    taken = [(x - 4, y - 4, x + 4, y + 4) for x, y in at * points_per_pixel]
-    for (x, y), p in zip(at * points_per_pixel, points, strict=True):
-        name = p.candidate.model
-        width = _LABEL * _CHARACTER * len(name)
-        boxes = [
-            (x + dx - (width if dx < 0 else 0), y + dy, dx, dy)
-            for dy in (4.0, -11.0, 13.0, -20.0, 22.0, -29.0, 31.0, -38.0)
-            for dx in (6.0, -6.0)
-        ]
-        free = [b for b in boxes if not any(_overlap(b, width, t) for t in taken)]
-        left, bottom, dx, dy = (free or boxes)[0]
-        taken.append((left, bottom, left + width, bottom + _LABEL))
+    at = at * 72.0 / axes.figure.dpi
+    taken = [(x - 4, y - 4, x + 4, y + 4) for x, y in at]
+    for k, ((x, y), p) in enumerate(zip(at, points, strict=True), start=1):
+        width = _LABEL * _CHARACTER * len(str(k))
+        places = [(5.0, 4.0), (5.0, -11.0), (-5.0 - width, 4.0), (-5.0 - width, -11.0)]
+        boxes = [(x + a, y + b, x + a + width, y + b + _LABEL) for a, b in places]
+        free = [n for n, b in enumerate(boxes) if not any(_overlap(b, t) for t in taken)]
+        chosen = (free or [0])[0]
+        taken.append(boxes[chosen])
         axes.annotate(
-            name, (p.cost, p.error), xytext=(dx, dy), textcoords="offset points",
-            ha="right" if dx < 0 else "left", fontsize=_LABEL, color=INK,
-            fontweight="bold" if p.candidate.on_front else "normal",
+            str(k), (p.cost, p.error), xytext=places[chosen], textcoords="offset points",
+            fontsize=_LABEL, color=INK,
         )  # fmt: skip
 
 
-def _overlap(
-    box: tuple[float, float, float, float],
-    width: float,
-    taken: tuple[float, float, float, float],
-) -> bool:
-    left, bottom = box[:2]
-    beside = left > taken[2] or left + width < taken[0]
-    above = bottom > taken[3] or bottom + _LABEL < taken[1]
-    return not (beside or above)
+def _overlap(one: Box, other: Box) -> bool:
+    beside = one[0] > other[2] or one[2] < other[0]
+    return not (beside or one[1] > other[3] or one[3] < other[1])
 
 
 def _bars(group: list[Candidate], table: Tradeoff) -> list[list[float]] | None:

@@ -31,8 +31,8 @@ def tolerance_trades(
 ) -> list[Trade]:
     """The relative tolerance of the cost at which the solver stops, from the same start.
 
-    The start is the best point of the scan, which is where a search begins; the error is
-    the objective over all rows.
+    The start is the best point of the scan, which is where a search begins, before there
+    are penalties; the error is the objective over all rows.
     """
     with jax.enable_x64(True):
         rows, problem, options = problem_of(measurement, result.model, options)
