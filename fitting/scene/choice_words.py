@@ -16,6 +16,7 @@ from fitting.scene.stage import ImageError, Stage, incidences
 
 _UNUSED, _DARK = 0.03, 1e-3
 _WORST = 0.1
+_LEAST_COLOUR = 0.001
 
 
 def amount(stage: Stage, value: float) -> str:
@@ -26,6 +27,8 @@ def amount(stage: Stage, value: float) -> str:
 def amount_of(measure: str, value: float) -> str:
     """An error in the measure of that name (`fitting.scene.difference`)."""
     if measure == COLOUR:
+        if 0 < value < _LEAST_COLOUR:
+            return f"<{_LEAST_COLOUR}"
         return f"{value:.2g}" if value < 10 else f"{value:.0f}"
     if measure == ALBEDO:
         return f"{value:.2g}"
@@ -152,6 +155,8 @@ def unsupported(stage: Stage, kept: Candidate) -> list[str]:
     out.append(
         f"the noise of the data alone makes {amount(stage, noise)} in this scene (mean); "
         "half of it is taken off the errors, in quadrature"
+        if noise > 0
+        else "no noise of the data was found to take off the errors"
     )
     if noise > stage.measure.limits[0]:
         out.append("that is more than the tolerance: repeat the measurement to tell more")
