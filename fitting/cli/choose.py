@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import threading
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -170,25 +173,30 @@ def _run(
     _every_model_has(candidates, settings)
     weights = [*_PICTURE, *(_PER_LOBE * len(m.lobes) for m in candidates.values())]
     total = sum(weights) + _UNCERTAINTIES
+    beside = min(len(candidates), os.cpu_count() or 1)
     with Work(terminal.stderr(), total, quiet=quiet) as work:
         return choose_for_scene(
             measurement,
             scene,
             list(candidates),
-            progress=_teller(work, weights),
+            progress=_teller(work, weights, beside),
             **settings,
         )
 
 
-def _teller(work: Work, weights: Sequence[int]) -> Callable[[str], None]:
-    """Says what begins, with the weights of all that was said before done."""
-    left, done, begun = list(weights), 0, 0
+def _teller(work: Work, weights: Sequence[int], beside: int) -> Callable[[str], None]:
+    """Says what begins; what was said before is done, but for refits ``beside`` it."""
+    left, begun, done = list(weights), deque[int](), 0
+    one_at_a_time = threading.Lock()
 
     def tell(what: str) -> None:
-        nonlocal done, begun
-        done += begun
-        begun = left.pop(0) if left else 0
-        work.at(what, done, 0)
+        nonlocal done
+        with one_at_a_time:
+            most = beside if what.startswith("refitting") and left else 1
+            begun.append(left.pop(0) if left else 0)
+            while len(begun) > most:
+                done += begun.popleft()
+            work.at(what, done, 0)
 
     return tell
 

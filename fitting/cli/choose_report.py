@@ -106,7 +106,8 @@ def _legend(found: Choice) -> tuple[str, ...]:
     return (
         "cost: counted operations of an evaluation, relative to the model that is kept (*)",
         f"{error}, without the noise of the data",
-        "change: the same difference, in the mean, from the model that is kept",
+        "change: the same difference from the model that is kept"
+        + ("" if found.measure == ALBEDO else ", in the mean"),
     )
 
 
@@ -159,7 +160,7 @@ def _wavelengths(out: Console, found: Choice) -> None:
         )
     for w in few[:1]:
         text += (
-            f"; at {len(w.wavelengths_nm)} ({_listed(w.wavelengths_nm)}) by "
+            f"; at {len(w.wavelengths_nm)} ({_listed(w.wavelengths_nm)}) off by "
             f"{_both(found, w.error)}, too much"
         )
     bullet(out, text)

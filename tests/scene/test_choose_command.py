@@ -215,11 +215,11 @@ def test_wavelengths_that_are_enough(done, answer):
     assert (
         "coefficients at 7 of 7 wavelengths (400, 450, 500, ..., 700 nm), linear between "
         "them: off by 0.31 on average and 0.62 at the 95th percentile; at 3 (400, 550, 700 "
-        "nm) by 2.6 on average and 5.2 at the 95th percentile, too much"
+        "nm) off by 2.6 on average and 5.2 at the 95th percentile, too much"
     ) in text
     choice = msgspec.structs.replace(done.choice, wavelengths=listed[1:])
     text = " ".join(answer(choice).out.split())
-    assert "coefficients at all 7 wavelengths; at 3 (400, 550, 700 nm) by 2.6" in text
+    assert "coefficients at all 7 wavelengths; at 3 (400, 550, 700 nm) off by 2.6" in text
 
 
 def test_an_albedo_has_one_number_and_radiance_is_relative(done, answer):
@@ -264,16 +264,18 @@ def test_options_reach_the_fits(done, run, monkeypatch):
     }
 
 
-def test_progress_is_by_what_is_done(monkeypatch):
+@pytest.mark.parametrize(
+    ("beside", "done"), [(1, [0, 4, 8, 23, 38, 68]), (2, [0, 4, 4, 8, 23, 68])]
+)
+def test_progress_is_by_what_is_done(monkeypatch, beside, done):
+    """Of two refits at the same time, neither is done when the second begins."""
     said = []
-    with Work(Console(file=io.StringIO()), 23, quiet=True) as work:
-        monkeypatch.setattr(work, "at", lambda *what: said.append(what))
-        tell = command._teller(work, [4, 4, 15])
-        for what in ("a", "b", "c", "more than planned", "end"):
+    with Work(Console(file=io.StringIO()), 68, quiet=True) as work:
+        monkeypatch.setattr(work, "at", lambda what, least, more: said.append(least))
+        tell = command._teller(work, [4, 4, 15, 15, 30], beside)
+        for what in ("data", "light", "refitting a", "refitting b", "refitting c", "end"):
             tell(what)
-    assert said == [
-        ("a", 0, 0), ("b", 4, 0), ("c", 8, 0), ("more than planned", 23, 0), ("end", 23, 0)
-    ]  # fmt: skip
+    assert said == done
 
 
 def test_names_of_results():
