@@ -9,10 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import least_squares
 
-from fitting.export.parts import Values
 from fitting.models import fresnel
 from fitting.models.microfacet import Options
 
+Values = dict[str, np.ndarray]
 _NODES = 48
 # log of eta and k: a transparent rim with a metal nearly the same at all angles, and two
 # transparent ones.

@@ -25,14 +25,22 @@ class Facets:
 
     part: Part
     distribution: Literal["ggx", "beckmann"]
-    shadowing: str
     widths: Values
     remarks: tuple[str, ...]
 
     @property
     def exact(self) -> bool:
         """Whether its Fresnel term is that of a conductor or a dielectric."""
-        return self.options.fresnel in ("conductor", "dielectric")
+        own = self.options.fresnel in ("conductor", "dielectric")
+        return own and self.part.curve is None
+
+    @property
+    def curve(self) -> np.ndarray:
+        """Its Fresnel term ``(n, c)`` at `conductor_curve.nodes`."""
+        if self.part.curve is not None:
+            return self.part.curve
+        cosines = conductor_curve.nodes()
+        return conductor_curve.reflectance(self.options, self.part.values, cosines)
 
     @functools.cached_property
     def conductors(self) -> list[Values]:
@@ -46,13 +54,17 @@ class Facets:
             found = [{"eta": own["eta"], "k": k, "scale": own["scale"]}]
         else:
             cosines = conductor_curve.nodes()
-            curve = conductor_curve.reflectance(self.options, own, cosines)
-            found = list(conductor_curve.two_conductors(curve, cosines))
+            found = list(conductor_curve.two_conductors(self.curve, cosines))
         channels = found[0]["scale"].shape
         top = max(float(np.max(c["scale"])) for c in found)
         wide = [{n: np.broadcast_to(v, channels) for n, v in c.items()} for c in found]
         kept = [c for c in wide if np.max(c["scale"]) > _NEGLIGIBLE * top]
         return kept or wide[:1]
+
+    @property
+    def shadowing(self) -> str:
+        """Of the lobe, by its option."""
+        return self.options.shadowing
 
     @property
     def options(self) -> Options:
@@ -75,5 +87,4 @@ def facets_of(part: Part) -> Facets | None:
             value = np.exp(np.mean(np.log(np.maximum(value, 1e-12))))
         widths[name] = np.asarray(np.ravel(value)[0])
     kind = cast(Literal["ggx", "beckmann"], part.term.lobe)
-    shadowing = getattr(part.lobe, "shadowing")  # noqa: B009
-    return Facets(part, kind, shadowing, widths, tuple(remarks))
+    return Facets(part, kind, widths, tuple(remarks))

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fitting.export import mtlx_file
+from fitting import expression as expr
+from fitting.export import conductor_curve, mtlx_file
 from fitting.export.mtlx_file import Value
 from fitting.export.parts import Lobes, Part, Values, sum_of
+from fitting.model import Model
 from fitting.models import Way
 
 _SAME = 1e-9
+# Where metals dip before grazing, acos(1/7) = 81.8 degrees.
+_DIP = 1.0 / 7.0
 
 
 @dataclass(frozen=True)
@@ -122,6 +127,8 @@ def _of_facets(part: Part) -> Node:
             f"the shadowing of {part.term} became MaterialX's, Smith's with correlated "
             "heights"
         )
+    if part.curve is not None:
+        return _of_curve(part, part.curve)
     if "alpha" in v:
         widths = np.repeat(_scalar(v["alpha"]), 2)
     else:
@@ -153,6 +160,30 @@ def _of_facets(part: Part) -> Node:
         inputs |= {"color82": v["tint"]} if "tint" in v else {}
         inputs |= {"exponent": _scalar(v["power"])} if "power" in v else {}
     return Node(category, inputs, (term, v), factor, remarks=tuple(remarks))
+
+
+def _of_curve(part: Part, curve: np.ndarray) -> Node:
+    """Facets with a Fresnel curve of their own, by the closest of generalised Schlick's
+    with the dip of metals (Kutz et al. 2021), which is linear in its amplitudes."""
+    c = conductor_curve.nodes()
+    q, dip = (1.0 - c) ** 5, c * (1.0 - c) ** 6 / (_DIP * (1.0 - _DIP) ** 6)
+    weight = np.sqrt(c)[:, None]
+    basis = np.stack([1.0 - q, q, -dip], axis=1)
+    f0, f90, less = np.linalg.lstsq(weight * basis, weight * curve, rcond=None)[0]
+    f0, f90 = np.maximum(f0, 0.0), np.maximum(f90, 0.0)
+    at_dip = f0 * (1.0 - (1.0 - _DIP) ** 5) + f90 * (1.0 - _DIP) ** 5
+    tint = np.clip(1.0 - less / np.maximum(at_dip, 1e-12), 0.0, 1.0)
+    kept = [o for o in part.term.options if o not in ("conductor", "dielectric")]
+    shapes = {n: part.values[n] for n in part.values if n.startswith(("alpha", "angle"))}
+    values = {**shapes, "f0": f0, "f90": f90, "tint": tint}
+    term = expr.Term("ggx", (*kept, "f82"))
+    (lobe,) = Model(str(term)).lobes
+    node = _of_facets(Part(term, lobe, values))
+    said = (
+        f"the Fresnel term of {part.term}, which differs over the wavelengths, became that "
+        "of generalised Schlick with F82-tint in three colours"
+    )
+    return dataclasses.replace(node, remarks=(*node.remarks, said))
 
 
 def _scalar(value: np.ndarray) -> float:

@@ -10,13 +10,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from fitting import expression as expr
+from fitting.export import conductor_curve
+from fitting.export.conductor_curve import Values
 from fitting.export.surface import Surface
 from fitting.geometry import Geometry
 from fitting.model import Model
 from fitting.models import Lobe, lobe_names
+from fitting.models.beckmann import Beckmann
+from fitting.models.ggx import GGX
 from fitting.predict import predict_geometry
-
-Values = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -24,12 +26,15 @@ class Part:
     """One lobe: as written, as an object, and its values under their short names.
 
     Coefficients have shape ``(c,)``; shape parameters ``()``, or ``(c,)`` where every
-    channel has its own.
+    channel has its own. ``curve (n, c)`` is the Fresnel term of facets whose index differs
+    over the wavelengths that were mixed, at `conductor_curve.nodes`: a mixture of curves,
+    which is no curve of one index; None for others.
     """
 
     term: expr.Term
     lobe: Lobe
     values: Values
+    curve: np.ndarray | None = None
 
     def named(self, name: str) -> bool:
         """Whether the lobe is of that name, turned neither around nor over."""
@@ -95,7 +100,10 @@ def parts_of(surface: Surface) -> tuple[list[Part], list[str]]:
             continue
         values, exact = _mixed(lobe, wide, surface.mixing.matrix)
         values, clipped = _within_support(lobe, values)
-        out.append(Part(term, lobe, values))
+        curve = None if exact else _mixed_curve(lobe, wide, surface.mixing.matrix)
+        out.append(Part(term, lobe, values, curve))
+        if curve is not None:
+            continue
         remarks += [f"{model.labels[i]}.{text}" for text in clipped]
         if not exact:
             remarks.append(
@@ -134,6 +142,22 @@ def _within_support(lobe: Lobe, values: Values) -> tuple[Values, list[str]]:
                 f"{off:.2g} to its edge"
             )
     return out, said
+
+
+def _mixed_curve(lobe: Lobe, values: Values, matrix: np.ndarray) -> np.ndarray | None:
+    """The mixture of Fresnel curves; None where not they alone differ, but widths as well.
+
+    Colours outside of the gamut are at its edge.
+    """
+    if not isinstance(lobe, GGX | Beckmann):
+        return None
+    own = {"eta", "k", "power"}
+    varying = {p.name for p in lobe.parameters() if not p.coefficient}
+    varying = {n for n in varying if values[n].ndim and np.ptp(values[n]) > 0}
+    if not varying or varying - own:
+        return None
+    curves = conductor_curve.reflectance(lobe, values, conductor_curve.nodes())
+    return np.maximum(curves @ matrix, 0.0)
 
 
 def _mixed(lobe: Lobe, values: Values, matrix: np.ndarray) -> tuple[Values, bool]:

@@ -38,7 +38,8 @@ def mixed(parts: Sequence[Part], remarks: Sequence[str]) -> Candidate | str:
     said = list(remarks)
     leaves = _conductors(facets, room, said)
     rest = 1.0 - sum(leaf.weight for leaf in leaves)
-    base, terms, ways = _base(matt, rest, said)
+    channels = max(v.size for part in parts for v in part.values.values())
+    base, terms, ways = _base(matt, rest, channels, said)
     tree: Leaf | Mix = base
     done = rest
     for leaf in leaves:
@@ -65,9 +66,7 @@ def _conductors(facets: Sequence[Facets], room: float, said: list[str]) -> list[
     Every lobe gets its part of the room, by how much it reflects at the most.
     """
     cosines = conductor_curve.nodes()
-    curves = [
-        conductor_curve.reflectance(f.options, f.part.values, cosines) for f in facets
-    ]
+    curves = [f.curve for f in facets]
     tops = [max(float(np.max(c)), 1e-9) for c in curves]
     out: list[_Weighted] = []
     for own, curve, top in zip(facets, curves, tops, strict=True):
@@ -120,7 +119,7 @@ def _conductor(facets: Facets, values: Values) -> Leaf:
 
 
 def _base(
-    matt: dict[str, np.ndarray], weight: float, said: list[str]
+    matt: dict[str, np.ndarray], weight: float, channels: int, said: list[str]
 ) -> tuple[Leaf, list[tuple[str, Values]], tuple[Way, ...]]:
     """What is matt, as one material of a weight, brighter by one over it."""
     colours = {n: np.clip(v / weight, 0.0, 1.0) for n, v in matt.items()}
@@ -141,8 +140,8 @@ def _base(
             "transmittance": colours["lambert_transmission"],
         }
         return Leaf("diffusetransmission", {**own}), terms, ("front", "down", "up")
-    black = {"reflectance": colours["lambert"]} if "lambert" in colours else {}
-    return Leaf("diffuse", {"reflectance": np.zeros(3), **black}), terms, ("front",)
+    matte = colours.get("lambert", np.zeros(channels))
+    return Leaf("diffuse", {"reflectance": matte}), terms, ("front",)
 
 
 def coated_diffuse(parts: Sequence[Part], remarks: Sequence[str]) -> Candidate | None:

@@ -13,6 +13,8 @@ from fitting.quantities import percent
 
 # Below this the two are one formula, evaluated with other roundings.
 EXACT = 1e-9
+# Of the largest value: what is darker is beside a beam and has no relative deviation.
+_DARK = 1e-9
 
 
 class Residual(msgspec.Struct, frozen=True):
@@ -152,8 +154,8 @@ def _relative(weight: np.ndarray, f: np.ndarray, g: np.ndarray) -> float:
 
 
 def _median(off: np.ndarray, size: np.ndarray, weight: np.ndarray) -> float:
-    """Weighted median of relative deviations; of black surfaces none."""
-    some = size > 0
+    """Weighted median of relative deviations, where there is light at all."""
+    some = size > _DARK * np.max(size, initial=0.0)
     if not some.any():
         return float(np.max(off, initial=0.0) > 0)
     ratio, w = off[some] / size[some], np.broadcast_to(weight, off.shape)[some]

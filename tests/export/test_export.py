@@ -189,3 +189,19 @@ def test_spectra_of_a_plain_sum_mix_exactly():
     mixed = sum_of([(str(p.term), p.values) for p in parts])
     g = geometry_of(*directions(0, 500))
     np.testing.assert_allclose(mixed(g), surface(g), rtol=1e-9)
+
+
+def gold():
+    """A metal whose index changes over the spectrum: no colour has an index of it."""
+    return result_of(
+        "ggx(conductor)", SPECTRAL, ggx__alpha=0.2, ggx__eta=np.linspace(1.5, 0.2, 6),
+        ggx__k=np.linspace(2.0, 4.0, 6),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("target", ["mitsuba", "pbrt", "materialx"])
+def test_the_colour_of_a_metal_is_that_of_its_spectrum(target):
+    report = export(gold(), target)
+    assert report.residual.relative_rms < 0.03
+    assert report.residual.typical < 0.02
+    assert not report.exact
