@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -38,6 +39,23 @@ def test_the_excerpt_is_what_the_command_prints(tmp_path, monkeypatch, capsys):
     for line in excerpt.splitlines():
         assert line.split() in printed, line
     assert (tmp_path / "two_lobe_paint.fit.json").exists()
+
+
+@pytest.mark.slow
+def test_the_excerpt_of_a_choice_is_what_the_command_prints(tmp_path, monkeypatch, capsys):
+    from fitting.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    (excerpt,) = blocks("console")
+    command, *lines = excerpt.splitlines()
+    prompt, name, *argv = shlex.split(command)
+    assert (prompt, name) == ("$", "brdf")
+    assert main(argv) == 0
+    printed = [line.split() for line in capsys.readouterr().out.splitlines()]
+    for line in lines:
+        assert line.split() in printed, line
+    assert (tmp_path / "two_lobe_paint.studio.fit.json").exists()
 
 
 def test_the_python_example_runs(tmp_path, monkeypatch, capsys):
