@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
+import haste
 import pytest
 
 # Where it is the rounding and the speed of the compiled code that is tested.
-OPTIMISED = ("models", "benchmarks", "test_stress.py")
+OPTIMISED = ("test_combined_options.py", "test_precision.py", "benchmarks")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -17,21 +19,37 @@ def pytest_configure(config: pytest.Config) -> None:
     tests is the compiler's."""
     import jax
 
-    folder = config.rootpath / ".pytest_cache" / "compiled"
-    jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    for name, value in haste.kept_in(config.rootpath).items():
+        jax.config.update(name, value)
+
+
+def pytest_collection_finish() -> None:
+    """What is there to stay is not looked through for garbage again and again."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(100_000, 20, 20)
 
 
 @pytest.fixture(autouse=True, scope="module")
 def compiled_in_haste(request: pytest.FixtureRequest) -> Iterator[None]:
     """Without most optimisations, where the same arithmetic only takes longer."""
+    if set(OPTIMISED) & set(request.path.parts):
+        yield
+    else:
+        with haste.everywhere():
+            yield
+
+
+@pytest.fixture(autouse=True, scope="module")
+def room_for_compiled_code() -> Iterator[None]:
+    """Linux grants a process 65,530 regions of memory, and every compiled function takes
+    three for good, small ones included: where they become many, the compiler aborts."""
     import jax
 
-    hasty = not set(OPTIMISED) & set(request.path.parts)
-    jax.config.update("jax_disable_most_optimizations", hasty)
     yield
-    jax.config.update("jax_disable_most_optimizations", False)
+    regions = Path("/proc/self/maps")
+    if regions.exists() and regions.read_bytes().count(b"\n") > 30_000:
+        jax.clear_caches()
 
 
 @pytest.fixture(scope="session")

@@ -61,11 +61,16 @@ def each(of: list[Variant]) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("variant", of, ids=str)
 
 
-def default_and_slow(of: list[Variant]) -> pytest.MarkDecorator:
-    """All variants, of which the default run takes some and the slow one the others."""
-    quick = {v.name for v in of}
-    marked = [
-        pytest.param(v, marks=() if v.name in quick else pytest.mark.slow, id=str(v))
-        for v in VARIANTS
-    ]
+def default_and_slow(
+    of: list[Variant], slow: list[Variant] = VARIANTS
+) -> pytest.MarkDecorator:
+    """All variants: some in the default run, others in the slow one, the rest in full."""
+    quick, later = {v.name for v in of}, {v.name for v in slow}
+
+    def marks(v: Variant) -> tuple[pytest.MarkDecorator, ...]:
+        if v.name in quick:
+            return ()
+        return (pytest.mark.slow if v.name in later else pytest.mark.full,)
+
+    marked = [pytest.param(v, marks=marks(v), id=str(v)) for v in VARIANTS]
     return pytest.mark.parametrize("variant", marked)

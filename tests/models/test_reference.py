@@ -354,9 +354,8 @@ def test_oren_nayar_exceeds_one_at_grazing_by_what_it_declares():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("nodes", "error"), [(8, 1.3e-2), (16, 2e-3), (32, 5e-4)])
 @pytest.mark.parametrize("name", ["ggx", "beckmann", "ward"])
-def test_declared_error_of_the_quadrature(name: str, nodes: int, error: float):
+def test_declared_error_of_the_quadrature(name: str):
     """Against many more nodes, for elongated lobes across and along the plane."""
     lobe = Case(name, (("anisotropic", True),)).lobe
     mu = [0.02, 0.1, 0.3, 0.6, 0.9, 1.0]
@@ -371,8 +370,9 @@ def test_declared_error_of_the_quadrature(name: str, nodes: int, error: float):
             shape = {"alpha_x": alpha_x, "alpha_y": alpha_y, "angle": 0.4}
             for azimuth in (0.0, 1.0):
                 exact = total(shape, azimuth, 200)
-                found = total(shape, azimuth, nodes)
-                np.testing.assert_allclose(found, exact, atol=error)
+                for nodes, error in ((8, 1.3e-2), (16, 2e-3), (32, 5e-4)):
+                    found = total(shape, azimuth, nodes)
+                    np.testing.assert_allclose(found, exact, atol=error)
 
 
 def test_diffuse_albedo_with_few_nodes():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import haste
 import nbformat
 import pytest
 from nbclient import NotebookClient
@@ -20,12 +21,13 @@ def test_there_are_notebooks():
 
 
 @each_notebook
-def test_runs(path, tmp_path, monkeypatch):
+def test_runs(path, tmp_path, monkeypatch, request):
     # Figures are drawn and thrown away; the user's own configuration stays out of it.
     monkeypatch.setenv("MPLCONFIGDIR", str(tmp_path / "matplotlib"))
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
-    # As the other tests compile their fits.
-    monkeypatch.setenv("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")
+    # As the other tests compile their fits, kept for the next notebook.
+    for name, value in haste.environment(request.config.rootpath).items():
+        monkeypatch.setenv(name, value)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     notebook = nbformat.read(path, as_version=4)
