@@ -11,8 +11,8 @@ import pytest
 from fitting.sample import sample_path
 
 COMMANDS = (
-    "fit", "info", "score", "plot", "convert", "models", "stress", "formats", "scene",
-    "doctor",
+    "fit", "info", "score", "choose", "plot", "convert", "models", "stress", "formats",
+    "scene", "doctor",
 )  # fmt: skip
 HEAVY = ("jax", "equinox", "optimistix", "colour", "matplotlib")
 SHOW_MODULES = (
@@ -36,7 +36,7 @@ def test_help_of_the_whole_loads_nothing(tmp_path):
     assert not modules & {*HEAVY, "numpy", "scipy", "h5py", "data_formats"}
 
 
-@pytest.mark.parametrize("command", ["fit", "score", "plot", "models", "doctor"])
+@pytest.mark.parametrize("command", ["fit", "score", "choose", "plot", "models", "doctor"])
 def test_help_of_a_command_loads_no_numbers(command, tmp_path):
     assert not loaded_by(command, "--help", cwd=tmp_path) & {*HEAVY, "numpy", "scipy"}
 
