@@ -163,11 +163,7 @@ def test_json_is_everything_and_alone(done, answer):
     outcome = answer(done.choice, "--json")
     assert outcome.code == 0
     assert outcome.err == ""
-
-    def refused(constant: str) -> None:
-        raise AssertionError(constant)
-
-    plain = json.loads(outcome.out, parse_constant=refused)
+    plain = json.loads(outcome.out, parse_constant=pytest.fail)
     assert msgspec.convert(plain, Choice) == done.choice
     jsonschema.validate(plain["result"], json_schema())
     assert [p.name for p in Path.cwd().iterdir()] == ["tiny.toml"]
