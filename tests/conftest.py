@@ -30,14 +30,24 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(100_000, 20, 20)
 
 
-@pytest.fixture(autouse=True, scope="module")
-def compiled_in_haste(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Without most optimisations, where the same arithmetic only takes longer."""
-    if set(OPTIMISED) & set(request.path.parts):
+@pytest.fixture(autouse=True, scope="session")
+def compiled_in_haste() -> Iterator[None]:
+    """Without optimisations, where the same arithmetic only takes longer."""
+    with haste.compiling(in_haste=True):
         yield
-    else:
-        with haste.everywhere():
-            yield
+
+
+@pytest.fixture(autouse=True, scope="module")
+def compiled_as_users_do(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Some of the tests are compiled as users compile it, and from the beginning."""
+    import jax
+
+    if not set(OPTIMISED) & set(request.path.parts):
+        yield
+        return
+    jax.clear_caches()
+    with haste.compiling(in_haste=False):
+        yield
 
 
 @pytest.fixture(autouse=True, scope="module")

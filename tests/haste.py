@@ -11,6 +11,7 @@ from typing import Any
 import jax
 from jax._src import compiler
 
+_AS_USERS = compiler.get_compile_options
 # No optimisation; elementwise code by the compiler's older, quicker way; in one part.
 _WISHES: dict[str, bool | int] = {
     "xla_backend_optimization_level": 0,
@@ -22,7 +23,7 @@ _WISHES: dict[str, bool | int] = {
 
 @functools.cache
 def options() -> dict[str, bool | int]:
-    """``compiler_options`` of `jax.jit`, those that this version of the compiler knows."""
+    """What this version of the compiler knows of what is wished."""
     return {name: value for name, value in _WISHES.items() if _is_known({name: value})}
 
 
@@ -35,20 +36,27 @@ def _is_known(option: dict[str, bool | int]) -> bool:
 
 
 @contextlib.contextmanager
-def everywhere() -> Iterator[None]:
-    """Every function that is compiled in the meantime."""
-    real, ours = compiler.get_compile_options, options()
-
-    def hasty(*args, env_options_overrides: dict[str, Any] | None = None, **kwargs):
-        both: Any = ours | (env_options_overrides or {})
-        return real(*args, env_options_overrides=both, **kwargs)
-
-    # JAX has no setting for them all.
-    compiler.get_compile_options = hasty
+def compiling(*, in_haste: bool) -> Iterator[None]:
+    """Everything that is compiled in the meantime: in haste, or as users compile it."""
+    before = compiler.get_compile_options
+    # JAX has no setting for all of these.
+    compiler.get_compile_options = (
+        functools.partial(_hasty, options()) if in_haste else _AS_USERS
+    )
     try:
         yield
     finally:
-        compiler.get_compile_options = real
+        compiler.get_compile_options = before
+
+
+def _hasty(
+    ours: dict[str, Any],
+    *args: Any,
+    env_options_overrides: dict[str, Any] | None = None,
+    **kwargs: Any,
+) -> Any:
+    both = ours | (env_options_overrides or {})
+    return _AS_USERS(*args, env_options_overrides=both, **kwargs)
 
 
 def kept_in(root: Path) -> dict[str, Any]:

@@ -11,6 +11,8 @@ from scipy.optimize import lsq_linear, nnls
 
 from fitting import qp
 
+solve = jax.jit(qp.solve)
+
 
 def problems(seed: int, m: int, channels: int = 7, rows: int = 60):
     """Correlated columns of very different size, as basis functions have."""
@@ -26,7 +28,7 @@ def problems(seed: int, m: int, channels: int = 7, rows: int = 60):
 def test_non_negative_least_squares(seed, m):
     a, y, hessian, linear = problems(seed, m)
     with jax.enable_x64(True):
-        out = qp.solve(hessian, linear, np.eye(m), np.zeros((7, m)))
+        out = solve(hessian, linear, np.eye(m), np.zeros((7, m)))
     for c in range(7):
         x, residual = nnls(a[c], y[c])
         ours = np.linalg.norm(a[c] @ np.asarray(out.x[c]) - y[c])
@@ -42,7 +44,7 @@ def test_upper_and_lower_bounds():
     rows = np.vstack([np.eye(4), -np.eye(4)])
     limits = np.tile(np.concatenate([low, -high]), (7, 1))
     with jax.enable_x64(True):
-        out = qp.solve(hessian, linear, rows, limits)
+        out = solve(hessian, linear, rows, limits)
     for c in range(7):
         best = lsq_linear(a[c], y[c], (low, high), tol=1e-14)
         ours = a[c] @ np.asarray(out.x[c]) - y[c]
@@ -59,7 +61,7 @@ def test_sum_constraint_is_kept_and_its_inverse_is_the_constrained_one():
     limit = -np.abs(0.5 * free @ weights) - 1e-3
     rows, limits = -weights[None], limit[:, None]
     with jax.enable_x64(True):
-        out = qp.solve(hessian, linear, rows, limits)
+        out = solve(hessian, linear, rows, limits)
     x = np.asarray(out.x)
     assert np.all(rows @ x.T >= limits.T - 1e-9)
     basis = np.linalg.svd(weights[None])[2][1:].T
@@ -74,7 +76,7 @@ def test_sum_constraint_is_kept_and_its_inverse_is_the_constrained_one():
 def test_without_constraints_it_is_the_plain_solution():
     _, _, hessian, linear = problems(8, 5)
     with jax.enable_x64(True):
-        out = qp.solve(hessian, linear, np.zeros((0, 5)), np.zeros((7, 0)))
+        out = solve(hessian, linear, np.zeros((0, 5)), np.zeros((7, 0)))
     exact = np.linalg.solve(hessian, linear[..., None])[..., 0]
     np.testing.assert_allclose(out.x, exact, rtol=1e-7)
     np.testing.assert_allclose(out.inverse, np.linalg.inv(hessian), rtol=1e-6)
@@ -85,7 +87,7 @@ def test_a_basis_that_vanishes_leaves_its_coefficient_at_the_bound():
     hessian[:, 1] = hessian[:, :, 1] = 0.0
     linear[:, 1] = 0.0
     with jax.enable_x64(True):
-        out = qp.solve(hessian, linear, np.eye(3), np.zeros((7, 3)))
+        out = solve(hessian, linear, np.eye(3), np.zeros((7, 3)))
     assert np.all(np.isfinite(out.x))
     np.testing.assert_allclose(np.asarray(out.x)[:, 1], 0.0, atol=1e-6)
 

@@ -68,10 +68,10 @@ def test_blocks_are_gradient_and_gauss_newton_matrix_of_the_plain_residual(
     with jax.enable_x64(True):
         p = prepared(noisy, objective=objective)
         u, x = jnp.array([0.3]), jnp.tile(jnp.array([0.2, 0.05, 0.7]), (3, 1))
-        b = reduced.evaluate(p, u, x, jnp.asarray(False))
+        b = jax.jit(reduced.evaluate)(p, u, x, jnp.asarray(False))
         residual = plain_residual(p)
         y = jnp.concatenate([u, b.x.ravel()])
-        r, jacobian = residual(y), jax.jacfwd(residual)(y)
+        r, jacobian = jax.jit(lambda y: (residual(y), jax.jacfwd(residual)(y)))(y)
         np.testing.assert_allclose(b.cost, r @ r, rtol=1e-9)
         gradient, matrix = jacobian.T @ r, jacobian.T @ jacobian
         size = float(np.abs(gradient).max())
@@ -167,11 +167,10 @@ def test_chunks_and_padding_change_nothing(noisy):
     with jax.enable_x64(True):
         p = prepared(noisy)
         u, x = jnp.array([0.3]), jnp.full((3, 3), 0.3)
-        whole = reduced.evaluate(p, u, x, jnp.asarray(False))
+        evaluate = jax.jit(reduced.evaluate)
+        whole = evaluate(p, u, x, jnp.asarray(False))
         parts = dataclasses.replace(p, chunk=p.kappa.shape[0] // 4)
-        for a, b in zip(
-            whole, reduced.evaluate(parts, u, x, jnp.asarray(False)), strict=True
-        ):
+        for a, b in zip(whole, evaluate(parts, u, x, jnp.asarray(False)), strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-15)
         n = select_rows(noisy, 85.0).index.size
         assert p.kappa.shape[0] == problem.bucket(n) > n

@@ -74,10 +74,14 @@ def albedos(expression: str, cos_theta, nodes: int = 32, **shape: float):
     return [np.asarray(e) for e in compiled(expression, nodes)(values, mu)]
 
 
+@functools.cache
+def compiled_basis(expression: str):
+    return jax.jit(Model(expression).lobes[0].basis)
+
+
 def basis(expression: str, geometry, **shape: float) -> np.ndarray:
-    lobe = Model(expression).lobes[0]
     values = {n: jnp.asarray(v) for n, v in shape.items()}
-    return np.stack(lobe.basis(values, jax.tree.map(jnp.asarray, geometry)))
+    return np.stack(compiled_basis(expression)(values, geometry))
 
 
 def directions(count: int = 400, seed: int = 3):
@@ -146,14 +150,15 @@ def test_a_good_mirror_in_single_precision(eta: float, k: float, absorbed: float
 
 @pytest.mark.parametrize("x64", [False, True])
 def test_conductor_derivatives_are_finite(x64: bool):
+    both_ways = [
+        jax.jit(of(fresnel.conductor, argnums=(1, 2))) for of in (jax.jacfwd, jax.jacrev)
+    ]
     with jax.enable_x64(x64):
         cosine = jnp.asarray([0.0, 1e-7, 0.01, 1 / 7, 0.5, 1.0])
         pairs = [(1e-3, 10.0), (0.05, 4.0), (1.0, 7.0), (1.5, 0.0), (0.5, 1e3), (1e-3, 0.0)]
         for eta, k in pairs:
-            for of in (jax.jacfwd, jax.jacrev):
-                found = of(fresnel.conductor, argnums=(1, 2))(
-                    cosine, jnp.asarray(eta), jnp.asarray(k)
-                )
+            for slopes in both_ways:
+                found = slopes(cosine, jnp.asarray(eta), jnp.asarray(k))
                 assert np.all(np.isfinite(found)), (eta, k)
 
 
@@ -336,16 +341,23 @@ def test_distributions_are_normalised(alpha: float, gamma: float):
         np.testing.assert_allclose(total, 1.0, rtol=2e-6, err_msg=name)
 
 
+@functools.cache
+def compiled_albedo(expression: str, nodes: int):
+    model = Model(expression)
+    return jax.jit(lambda values, mu: model_albedo(model, values, mu, nodes=nodes))
+
+
 @pytest.mark.parametrize("lobe", ["ggx", "beckmann"])
 @pytest.mark.parametrize("alpha", [1e-3, 0.1, 0.5, 1.0, 1.5])
 def test_multiple_scattering_loses_nothing(lobe: str, alpha: float):
     """With F = 1 the albedo is 1 in every direction (Kulla and Conty 2017)."""
     values = {f"{lobe}.alpha": alpha, f"{lobe}.f0": 1.0, f"{lobe}.f90": 1.0}
-    model = Model(f"{lobe}(ms)")
-    total = model_albedo(model, values, [0.05, 0.1, 0.3, 0.6, 1.0], nodes=64)
+    total = compiled_albedo(f"{lobe}(ms)", 64)(values, np.array([0.05, 0.1, 0.3, 0.6, 1.0]))
     np.testing.assert_allclose(total, 1.0, atol=1.2e-3)
     grey = {**values, f"{lobe}.f0": 0.5, f"{lobe}.f90": 0.5}
-    assert np.all(model_albedo(model, grey, [0.3, 1.0]) < 0.5 + 1e-4)
+    assert np.all(
+        compiled_albedo(f"{lobe}(ms)", 16)(grey, np.array([0.3, 1.0])) < 0.5 + 1e-4
+    )
 
 
 def test_options_that_exclude_each_other():
