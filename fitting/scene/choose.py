@@ -16,13 +16,14 @@ from data_formats import Measurement
 from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions
+from fitting.result import FitResult
 from fitting.scene import choice_words as words
 from fitting.scene.choice import CHOICE_VERSION, Candidate, Choice
 from fitting.scene.description import Scene
 from fitting.scene.load import load_scene
 from fitting.scene.refit import Refit, confirmed, refit
 from fitting.scene.render import render
-from fitting.scene.stage import Stage, set_stage
+from fitting.scene.stage import ImageError, Stage, set_stage
 from fitting.scene.wavelengths import fewer_wavelengths
 from fitting.tradeoff.evaluation_cost import operations
 
@@ -93,12 +94,8 @@ def choose_for_scene(
             tried.append(_try(stage, one, replace(options, per_channel_shape=True)))
         best = _cheapest(tried)
     tried.sort(key=lambda t: (t.candidate.operations, t.candidate.parameters))
-    best = _cheapest(tried)
-    met = best is not None
-    chosen = tried.index(best) if best is not None else _nearest(tried)
+    chosen, met, result, error = _confirmed(stage, tried, say)
     kept = tried[chosen]
-    say(f"uncertainties of {kept.candidate.model}")
-    result, error = confirmed(stage, kept.fit, kept.candidate.precision)
     candidates = _told(stage, tried, chosen)
     return Choice(
         version=CHOICE_VERSION,
@@ -158,6 +155,30 @@ def _try(stage: Stage, expression: str, options: FitOptions) -> _Tried:
         within_tolerance=stage.within(error),
     )
     return _Tried(candidate, found)
+
+
+def _confirmed(
+    stage: Stage, tried: list[_Tried], say: Say
+) -> tuple[int, bool, FitResult, ImageError]:
+    """Which is kept: the cheapest that is within the tolerance also as fitted in full.
+
+    With penalties a fit may be farther off than without, and its candidate says so. If none
+    is within the tolerance, the nearest one is kept.
+    """
+    within = [i for i, t in enumerate(tried) if t.candidate.within_tolerance]
+    for i in within:
+        say(f"uncertainties of {tried[i].candidate.model}")
+        result, error = confirmed(stage, tried[i].fit, tried[i].candidate.precision)
+        if stage.within(error):
+            return i, True, result, error
+        own = msgspec.structs.replace(
+            tried[i].candidate, error=error, within_tolerance=False
+        )
+        tried[i] = replace(tried[i], candidate=own)
+    i = _nearest(tried)
+    say(f"uncertainties of {tried[i].candidate.model}")
+    result, error = confirmed(stage, tried[i].fit, tried[i].candidate.precision)
+    return i, False, result, error
 
 
 def _count(found: Refit) -> int:
