@@ -18,6 +18,7 @@ from scipy.interpolate import RBFInterpolator, RegularGridInterpolator
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import KDTree
 
+from data_formats import MeasurementError
 from fitting.geometry import Geometry
 from fitting.rows import Rows
 from fitting.scene.chart import Chart, HalfAngles, from_half_angles, half_angles
@@ -26,7 +27,7 @@ from fitting.solid_angle import incidence_labels
 _NEIGHBOURS = {True: 64, False: 96}
 _SMOOTHINGS = (1e-2, 1.0, 1e1, 1e2, 1e3)
 _FIRST_SMOOTHING = 1.0
-_HELD_OUT = 400
+_HELD_OUT, _FEWEST = 400, 12
 _ABOVE_NOISE = 3.0
 _NEARBY, _OVERSHOOT = 16, 0.25
 _MAD_TO_SIGMA = 1.4826
@@ -76,9 +77,15 @@ class Reference:
 def interpolate(rows: Rows, *, isotropic: bool, seed: int = 0) -> Reference:
     """The reference of rows of light reflected at the front.
 
-    Values that are not valid in some channel are left out for all, unless too few rows are
-    complete; then channels that miss values take the mean of the others there.
+    Channels that miss values take the mean of the others there, relative to what is usual.
+    Raises `MeasurementError` if there are less than twelve rows.
     """
+    count = rows.index.size
+    if count < _FEWEST:
+        raise MeasurementError(
+            f"found {count} rows of light reflected at the front; expected {_FEWEST} or "
+            "more, to interpolate between"
+        )
     angles = half_angles(rows.geometry)
     chart = _chart_of(rows, angles, isotropic)
     points = chart.points(angles)
