@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from data_formats import Measurement
@@ -16,7 +17,7 @@ from fitting.model import Model
 from fitting.models import lobe_names
 from fitting.models.lobe import THROUGH
 from fitting.options import FitOptions
-from fitting.result import FitResult
+from fitting.result import Candidate, Candidates, FitResult
 from fitting.rows import ways_of
 
 # What is tried when the user names no model: diffuse plus one lobe with long skirts, with
@@ -82,6 +83,37 @@ class Comparison:
     results: tuple[FitResult, ...]
     best: int
     reason: str
+
+    @property
+    def kept(self) -> FitResult:
+        """The result to keep; of several it says with which others it was compared."""
+        result = self.results[self.best]
+        if len(self.results) == 1:
+            return result
+        models = [candidate(r, kept=r is result) for r in self.results]
+        return msgspec.structs.replace(result, candidates=Candidates(models, self.reason))
+
+
+def candidate(result: FitResult, *, kept: bool) -> Candidate:
+    """The figures of a result that others compare with."""
+    held_out = result.cross_validation
+    return Candidate(
+        model=result.model,
+        parameters=n_free(result),
+        error=objective_error(result),
+        held_out=None if held_out is None else held_out.typical,
+        max_albedo=result.energy.max_albedo,
+        converged=result.solver.converged,
+        kept=kept,
+    )
+
+
+def objective_error(result: FitResult) -> float | None:
+    """RMS of what was made small; of chi2 the root of its reduced value."""
+    if result.settings.objective == "chi2":
+        reduced = result.scores.chi2_reduced
+        return None if reduced is None else math.sqrt(reduced)
+    return getattr(result.scores, result.settings.objective)
 
 
 def n_free(result: FitResult) -> int:

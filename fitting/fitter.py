@@ -160,6 +160,7 @@ def _fit(
         data=data_record(measurement, rows, float(np.mean(model.relative_index(values)))),
         versions=_versions(),
         references=sorted({lobe.REFERENCE for lobe in model.lobes}),
+        typical_deviation=judge.typical_deviation(predicted, rows.value, rows.valid),
     )  # fmt: skip
 
 

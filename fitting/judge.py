@@ -50,6 +50,21 @@ def scores(rows: Rows, predicted: np.ndarray, options: FitOptions) -> Scores:
     )
 
 
+def typical_deviation(predicted: np.ndarray, value: np.ndarray, valid: np.ndarray) -> float:
+    """Median relative difference of fit and data ``(n, c)``, averaged over valid channels.
+
+    The same figure as the reciprocity error of the data, so that the two compare.
+    """
+    count = valid.sum(axis=1)
+    there = np.where(valid, predicted, 0.0).sum(axis=1) / count
+    here = np.where(valid, value, 0.0).sum(axis=1) / count
+    size = 0.5 * (np.abs(there) + np.abs(here))
+    good = size > 0
+    if not good.any():
+        return 0.0
+    return float(np.median(np.abs(there - here)[good] / size[good]))
+
+
 def theta_i_of(rows: Rows) -> np.ndarray:
     """Polar angle of incidence of every row, rad."""
     g = rows.geometry

@@ -233,9 +233,35 @@ class Colour(msgspec.Struct, frozen=True):
     maximum: float
 
 
+class Candidate(msgspec.Struct, frozen=True):
+    """One of the models that were fitted to the same data in one go.
+
+    ``error`` and ``held_out`` are those by which they are compared: the RMS of the
+    objective (of chi2 the root of its reduced value), and that of angles of incidence that
+    were not fitted, as ``typical`` in `CrossValidation`.
+    """
+
+    model: str
+    parameters: int
+    error: float | None
+    held_out: float | None
+    max_albedo: float
+    converged: bool
+    kept: bool
+
+
+class Candidates(msgspec.Struct, frozen=True):
+    """All the models, in the order in which they were given, and why one was kept."""
+
+    models: list[Candidate]
+    reason: str
+
+
 class FitResult(msgspec.Struct, frozen=True):
     """Everything that a fit says about a surface, as plain data.
 
+    ``typical_deviation`` is the median relative difference of fit and data, both averaged
+    over channels; ``candidates`` are null for a fit on its own.
     `evaluate` computes the BRDF anew; `save` and `load_result` are a lossless round trip.
     """
 
@@ -258,6 +284,8 @@ class FitResult(msgspec.Struct, frozen=True):
     data: Data
     versions: dict[str, str]
     references: list[str]
+    typical_deviation: float | None = None
+    candidates: Candidates | None = None
 
     def __str__(self) -> str:
         from fitting.describe import describe

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Console
 
 from fitting.cli.terminal import heading, table
-from fitting.comparison import Comparison, n_free
+from fitting.comparison import Comparison, n_free, objective_error
 from fitting.quantities import degrees, number
 from fitting.result import FitResult
 
@@ -23,7 +23,7 @@ def show(out: Console, done: Comparison) -> None:
             "*" if k == done.best else "",
             r.model,
             str(n_free(r)),
-            number(_score(r), 3),
+            number(objective_error(r), 3),
             _held_out(r),
             f"{r.energy.max_albedo:.2f}",
             "" if r.solver.converged else "did not converge",
@@ -33,13 +33,6 @@ def show(out: Console, done: Comparison) -> None:
     _by_angle(out, done)
     out.print("\nheld-out: typical RMS at an angle of incidence that was not fitted")
     out.print(f"* kept: {done.reason}")
-
-
-def _score(result: FitResult) -> float | None:
-    if result.settings.objective == "chi2":
-        reduced = result.scores.chi2_reduced
-        return None if reduced is None else reduced**0.5
-    return getattr(result.scores, result.settings.objective)
 
 
 def _held_out(result: FitResult) -> str:

@@ -62,7 +62,7 @@ def fit(
     from fitting.cli import fit_run
 
     done = fit_run.run(measurement, job, flags)
-    result = done.results[done.best]
+    result = done.kept
     if target is not None:
         result.save(target)
     if job.json:

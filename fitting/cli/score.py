@@ -43,8 +43,8 @@ def score(
         return 0
     from fitting.cli import error_report
     from fitting.cli.terminal import stdout
-    from fitting.cli.verdict import typical_deviation
     from fitting.quantities import count, percent
+    from fitting.verdict import typical_deviation
 
     out = stdout()
     same = measurement.provenance.sha256 == fitted.data.sha256

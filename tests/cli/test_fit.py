@@ -40,6 +40,18 @@ def test_compares_keeps_and_judges(fitted):
     assert "fitting lambert + ggx (2 of 2)" in outcome.err
 
 
+def test_the_file_tells_what_the_kept_model_was_compared_with(fitted):
+    found = load_result(fitted.file).candidates
+    assert found is not None
+    assert found.reason == fitted.comparison.reason
+    for one, result in zip(found.models, fitted.comparison.results, strict=True):
+        assert one.model == result.model
+        assert one.error == result.scores.log1p
+        assert one.held_out == result.cross_validation.typical
+        assert one.parameters == sum(len(p.value) for p in result.parameters)
+    assert [m.kept for m in found.models] == [False, True]
+
+
 def test_writes_a_valid_result(fitted):
     jsonschema.validate(json.loads(fitted.file.read_text()), json_schema())
     result = load_result(fitted.file)

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from data_formats import read
-from fitting.cli import verdict
+from fitting import verdict
 from fitting.sample import sample_path
 
 change = msgspec.structs.replace
@@ -37,6 +37,20 @@ def test_deviation_of_the_sample_is_that_of_its_noise(fitted):
     measurement = read(sample_path())
     assert verdict.typical_deviation(better, measurement) < 0.05
     assert verdict.typical_deviation(poor, measurement) > 0.1
+
+
+def test_the_deviation_is_kept_in_the_result_and_used_without_the_data(fitted):
+    measurement = read(sample_path())
+    for result in fitted.comparison.results:
+        found = verdict.typical_deviation(result, measurement)
+        assert result.typical_deviation == pytest.approx(found, rel=1e-6)
+        assert verdict.judge(result, None) == verdict.judge(result, measurement)
+
+
+def test_a_result_that_tells_no_deviation_gets_no_verdict_without_the_data(good):
+    found = verdict.judge(change(good, typical_deviation=None), None)
+    assert found.level == "unknown"
+    assert "the measurement is not at hand" in found.headline
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,13 @@ from typing import Literal
 import numpy as np
 
 from data_formats import Measurement
+from fitting import judge as distances
 from fitting.model import Model
 from fitting.quantities import degrees, percent
 from fitting.result import FitResult
 from fitting.rows import select_rows
 
-Level = Literal["good", "fair", "poor"]
+Level = Literal["good", "fair", "poor", "unknown"]
 
 # Deviations below this are at the level of any goniometer, whatever the data say.
 _ALWAYS_GOOD = 0.01
@@ -34,9 +35,14 @@ class Verdict:
     advice: tuple[str, ...]
 
 
-def judge(result: FitResult, measurement: Measurement) -> Verdict:
-    """How good the fit is relative to what the data are worth, and what is wrong."""
-    deviation = typical_deviation(result, measurement)
+def judge(result: FitResult, measurement: Measurement | None) -> Verdict:
+    """How good the fit is relative to what the data are worth, and what is wrong.
+
+    Without the measurement by what the result says of itself.
+    """
+    deviation = result.typical_deviation
+    if measurement is not None:
+        deviation = typical_deviation(result, measurement)
     level, headline = _headline(result, deviation)
     advice = [
         *_search(result),
@@ -49,29 +55,24 @@ def judge(result: FitResult, measurement: Measurement) -> Verdict:
 
 
 def typical_deviation(result: FitResult, measurement: Measurement) -> float:
-    """Median relative difference of fit and data, both averaged over channels.
-
-    The same figure as the reciprocity error of the data, so that the two compare.
-    """
+    """Median relative difference of fit and these data, both averaged over channels."""
     m = measurement
     limit = result.settings.max_theta_deg
     at = select_rows(m, limit, Model(result.model).ways).index
     fitted = result.evaluate(m.theta_i[at], m.phi_i[at], m.theta_r[at], m.phi_r[at])
     valid = m.valid[at]
-    count = valid.sum(axis=1)
-    fitted = np.where(valid, np.broadcast_to(fitted.reshape(at.size, -1), valid.shape), 0.0)
-    there = fitted.sum(axis=1) / count
-    here = np.where(valid, m.value[at], 0.0).sum(axis=1) / count
-    size = 0.5 * (np.abs(there) + np.abs(here))
-    good = size > 0
-    if not good.any():
-        return 0.0
-    return float(np.median(np.abs(there - here)[good] / size[good]))
+    fitted = np.broadcast_to(fitted.reshape(at.size, -1), valid.shape)
+    return distances.typical_deviation(fitted, m.value[at], valid)
 
 
-def _headline(result: FitResult, deviation: float) -> tuple[Level, str]:
+def _headline(result: FitResult, deviation: float | None) -> tuple[Level, str]:
     if not result.solver.converged:
         return "poor", f"Not a fit yet: the search {result.solver.sentence}."
+    if deviation is None:
+        return "unknown", (
+            f"No verdict: how far {result.model} is from the data is not in this result, "
+            "and the measurement is not at hand."
+        )
     name, off = result.model, percent(deviation)
     measured = result.data.reciprocity or result.data.reciprocity_transmitted
     if measured is None:
