@@ -13,6 +13,11 @@ import numpy as np
 
 from fitting.geometry import Geometry, from_components
 
+# Round lobes are interpolated better with less, those of Phong's kind with more.
+_SQUEEZE = 1.0 / 3.0
+# Steps.
+_NEAR = 8.0
+
 
 @dataclass(frozen=True)
 class HalfAngles:
@@ -66,8 +71,9 @@ class Chart:
     Distances are in units of ``step_h`` and ``step_d`` (rad), the distance of neighbouring
     samples in the half vector and in ``theta_d``. Exchanged directions are one point
     (reciprocity). Of an isotropic surface pairs that differ by a turn of the sample or by
-    reflection at the plane of incidence are one point of three dimensions; else there are
-    four: the half vector, and the light around it.
+    reflection at the plane of incidence are one point of three dimensions: ``theta_h`` is
+    a radius, ``phi_d`` an angle, which is squeezed since it matters little but for shadows
+    and off-specular lobes. Else there are four: the half vector, and the light around it.
     """
 
     step_h: float
@@ -79,10 +85,29 @@ class Chart:
         r, s = a.theta_h / self.step_h, a.theta_d / self.step_d
         if self.isotropic:
             folded = np.arctan2(np.abs(np.sin(a.phi_d)), np.abs(np.cos(a.phi_d)))
-            return np.stack([r * np.cos(folded), r * np.sin(folded), s], axis=-1)
+            turn = _SQUEEZE * folded
+            return np.stack([r * np.cos(turn), r * np.sin(turn), s], axis=-1)
         # The light's azimuth in the surface; twice, as exchanging adds half a turn.
         turn = 2.0 * (a.phi_d + a.phi_h)
         return np.stack(
             [r * np.cos(a.phi_h), r * np.sin(a.phi_h), s * np.cos(turn), s * np.sin(turn)],
             axis=-1,
         )
+
+    def images(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points and their images by the symmetries of an isotropic surface, and whose
+        they are.
+
+        Images lie beyond the plane of incidence, beyond the one across it, and beyond the
+        normal. The data have no edge there then, and a highlight is a summit. Those that
+        are within a few steps of their points are enough.
+        """
+        x, y, s = points.T
+        r, turn = np.hypot(x, y), np.arctan2(y, x)
+        found, index = [points], [np.arange(len(points))]
+        for t in (-turn, _SQUEEZE * np.pi - turn, turn + np.pi, np.pi - turn):
+            image = np.stack([r * np.cos(t), r * np.sin(t), s], axis=-1)
+            near = np.flatnonzero(np.linalg.norm(image - points, axis=1) < _NEAR)
+            found.append(image[near])
+            index.append(near)
+        return np.concatenate(found), np.concatenate(index)

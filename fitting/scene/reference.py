@@ -100,7 +100,11 @@ def interpolate(rows: Rows, *, isotropic: bool, seed: int = 0) -> Reference:
     neighbours = min(_NEIGHBOURS[isotropic], len(kept))
 
     def local(among: np.ndarray, columns: np.ndarray, smoothing: float) -> _Local:
-        return _Local(points[among], columns[among], neighbours, smoothing)
+        at, own = points[among], among
+        if isotropic:
+            at, index = chart.images(at)
+            own = among[index]
+        return _Local(at, columns[own], neighbours, smoothing)
 
     first = local(kept, np.arcsinh(value / scale), _FIRST_SMOOTHING)(points[held])
     relative, floor = _noise(value[held], scale * np.sinh(first))
@@ -195,21 +199,16 @@ class _Local:
     def __init__(
         self, points: np.ndarray, columns: np.ndarray, neighbours: int, smoothing: float
     ):
-        _, first, index = np.unique(
-            np.round(points, 1), axis=0, return_index=True, return_inverse=True
-        )
-        index = index.reshape(-1)
-        total = np.zeros((len(first), columns.shape[1]))
-        np.add.at(total, index, columns)
-        mean = total / np.bincount(index)[:, None]
-        near = min(neighbours, len(first))
-        where = points[first]
+        _, cell = np.unique(np.round(points, 1) + 0.0, axis=0, return_inverse=True)
+        cell = cell.reshape(-1)
+        where, mean = (_mean_of(a, cell) for a in (points, columns))
+        near = min(neighbours, len(where))
         self._tree, self._mean = KDTree(where), mean
         self._linear = RBFInterpolator(
             where, mean, neighbors=near, smoothing=smoothing, kernel="linear", degree=0
         )
         self._cubic = None
-        if len(first) > points.shape[1]:
+        if len(where) > points.shape[1]:
             self._cubic = RBFInterpolator(
                 where, mean, neighbors=near, smoothing=smoothing, kernel="cubic", degree=1
             )
@@ -231,6 +230,12 @@ class _Local:
             except np.linalg.LinAlgError:
                 self._cubic = None
         return self._linear(points)
+
+
+def _mean_of(a: np.ndarray, cell: np.ndarray) -> np.ndarray:
+    """Mean of the rows of ``a (n, k)`` in each cell."""
+    total = np.stack([np.bincount(cell, column) for column in a.T], axis=1)
+    return total / np.bincount(cell)[:, None]
 
 
 def _axes(isotropic: bool) -> list[np.ndarray]:
