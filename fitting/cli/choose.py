@@ -67,15 +67,16 @@ def choose(
         list[str] | None,
         Parameter(
             negative="", group=_WHAT,
-            help="NAME=VALUE, or one value per channel with commas, in every candidate. "
-            "Repeatable; `*` in the name stands for anything.",
+            help="NAME=VALUE, or one value per channel with commas, where a candidate "
+            "has it. Repeatable; `*` in the name stands for anything.",
         ),
     ] = None,
     bounds: Annotated[
         list[str] | None,
         Parameter(
             negative="", group=_WHAT,
-            help="NAME=LOW:HIGH in every candidate, an empty end is infinite. Repeatable.",
+            help="NAME=LOW:HIGH where a candidate has it, an empty end is infinite. "
+            "Repeatable.",
         ),
     ] = None,
     output: Annotated[
@@ -164,13 +165,15 @@ def _run(
     settings: Mapping[str, Any],
     quiet: bool,
 ) -> Choice:
+    from fitting.by_name import unused, unused_words
     from fitting.cli import terminal
     from fitting.cli.work import Work
     from fitting.model import Model
     from fitting.scene.choose import LADDER, choose_for_scene
 
     candidates = {(own := Model(m)).expression: own for m in models or LADDER}
-    _every_model_has(candidates, settings)
+    if nobody := unused(candidates.values(), settings):
+        raise failures.UsageError(unused_words(candidates.values(), *nobody))
     weights = [*_PICTURE, *(_PER_LOBE * len(m.lobes) for m in candidates.values())]
     total = sum(weights) + _UNCERTAINTIES
     beside = min(len(candidates), os.cpu_count() or 1)
@@ -199,21 +202,6 @@ def _teller(work: Work, weights: Sequence[int], beside: int) -> Callable[[str], 
             work.at(what, done, 0)
 
     return tell
-
-
-def _every_model_has(candidates: Mapping[str, Any], settings: Mapping[str, Any]) -> None:
-    """What is fixed or bounded is so in all candidates, or they would not compare."""
-    import fnmatch
-
-    for key in ("fix", "bounds"):
-        for pattern in settings[key]:
-            for expression, own in candidates.items():
-                names = own.parameters()
-                if not any(fnmatch.fnmatch(name, pattern) for name in names):
-                    raise failures.UsageError(
-                        f"--{key} {pattern}: {expression} has no such parameter, but "
-                        f"{', '.join(names)}; give candidates that have it with -m"
-                    )
 
 
 def _sample() -> Path:

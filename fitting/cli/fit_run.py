@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import fnmatch
-from collections.abc import Mapping
-from typing import Any
-
 from data_formats import Measurement
+from fitting.by_name import own_settings, unused, unused_words
 from fitting.cli import terminal
 from fitting.cli.failures import UsageError
 from fitting.cli.fit_settings import Job
@@ -17,8 +14,6 @@ from fitting.fitter import fit
 from fitting.model import Model
 from fitting.options import FitOptions
 
-_BY_NAME = ("fix", "bounds", "tie")
-
 
 def run(measurement: Measurement, job: Job, flags: Flags) -> Comparison:
     """Fit every model and choose.
@@ -27,8 +22,9 @@ def run(measurement: Measurement, job: Job, flags: Flags) -> Comparison:
     does not exist.
     """
     models = [Model(m) for m in job.models or default_models(measurement)]
-    options = [_options_for(m, job.options) for m in models]
-    _every_name_is_used(models, job.options)
+    if nobody := unused(models, job.options):
+        raise UsageError(unused_words(models, *nobody))
+    options = [own_settings(m, job.options) for m in models]
     console = terminal.stderr()
     quiet = flags.quiet or job.json
     results = []
@@ -52,27 +48,3 @@ def run(measurement: Measurement, job: Job, flags: Flags) -> Comparison:
             "parameters always look better"
         )
     return Comparison(tuple(results), best, reason)
-
-
-def _options_for(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
-    """The options without what concerns parameters that only other models have."""
-    own = dict(options)
-    for key in _BY_NAME:
-        if key in own:
-            own[key] = {
-                pattern: v for pattern, v in own[key].items() if _matches(model, pattern)
-            }
-    return own
-
-
-def _every_name_is_used(models: list[Model], options: Mapping[str, Any]) -> None:
-    for key in _BY_NAME:
-        for pattern in options.get(key, {}):
-            if any(_matches(m, pattern) for m in models):
-                continue
-            has = "; ".join(f"{m.expression}: {', '.join(m.parameters())}" for m in models)
-            raise UsageError(f"--{key} {pattern}: there is no such parameter; {has}")
-
-
-def _matches(model: Model, pattern: str) -> bool:
-    return any(fnmatch.fnmatch(name, pattern) for name in model.parameters())

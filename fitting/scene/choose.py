@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 
 from data_formats import Measurement
+from fitting.by_name import own_settings
 from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions
@@ -66,7 +67,8 @@ def choose_for_scene(
 ) -> Choice:
     """Refit every model for the scene and keep the cheapest within its tolerance.
 
-    ``models`` are `LADDER` by default; ``settings`` fields of `FitOptions`. Cost is
+    ``models`` are `LADDER` by default; ``settings`` fields of `FitOptions`,
+    of which each model takes what names its parameters. Cost is
     `fitting.tradeoff.evaluation_cost.operations`, which does not depend on the machine. If
     no model is within the tolerance, or only one that costs more, models with a shape for
     every channel are tried too; if still none is, the nearest one is kept, and ``met`` is
@@ -85,13 +87,13 @@ def choose_for_scene(
     if stage is None:
         told = scene if isinstance(scene, Scene) else load_scene(scene)
         stage = set_stage(measurement, told, progress=say)
-    options = FitOptions(**{"starts": STARTS, **settings})
-    tried = _all(stage, models, options, say)
+    settings = {"starts": STARTS, **settings}
+    tried = _all(stage, models, settings, say)
     best = _cheapest(tried)
-    if measurement.n_channels > 1 and not options.per_channel_shape:
+    if measurement.n_channels > 1 and not settings.get("per_channel_shape"):
         for one in _worth_a_shape_per_channel(tried, best, measurement.n_channels):
             say(f"refitting {one} with a shape per channel")
-            tried.append(_try(stage, one, replace(options, per_channel_shape=True)))
+            tried.append(_try(stage, one, {**settings, "per_channel_shape": True}))
         best = _cheapest(tried)
     tried.sort(key=lambda t: (t.candidate.operations, t.candidate.parameters))
     chosen, met, result, error = _confirmed(stage, tried, say)
@@ -116,14 +118,14 @@ def choose_for_scene(
 
 
 def _all(
-    stage: Stage, models: Sequence[str], options: FitOptions, say: Say
+    stage: Stage, models: Sequence[str], settings: Mapping[str, Any], say: Say
 ) -> list[_Tried]:
     """Every model; most of the time is the compiler's, which runs beside itself."""
     told = itertools.count(1)
 
     def one(model: str) -> _Tried:
         say(f"refitting {model} ({next(told)} of {len(models)})")
-        return _try(stage, model, options)
+        return _try(stage, model, settings)
 
     workers = min(len(models), os.cpu_count() or 1, _MOST_THREADS)
     pool = ThreadPoolExecutor(workers)
@@ -133,7 +135,8 @@ def _all(
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _try(stage: Stage, expression: str, options: FitOptions) -> _Tried:
+def _try(stage: Stage, expression: str, settings: Mapping[str, Any]) -> _Tried:
+    options = FitOptions(**own_settings(Model(expression), settings))
     found = refit(stage, expression, options)
     single = stage.error(found.model, found.values, precision="f32")
     limit = stage.measure.limits[0]

@@ -285,7 +285,7 @@ def test_names_of_results():
         (("-m", "lamber"), 2, ["lamber"]),
         (("-m", "lambert_transmission"), 2, ["does not reflect"]),
         (("--max-theta", "95"), 2, ["--max-theta"]),
-        ((*MODELS, "--fix", "ggx.f90=1"), 2, ["--fix ggx.f90", "lambert has no such"]),
+        ((*MODELS, "--fix", "ggx.f91=1"), 2, ["--fix ggx.f91", "no such parameter"]),
         ((*MODELS, "--bounds", "ggx.alpha=1"), 2, ["LOW:HIGH"]),
         (("-o", "nowhere/a.fit.json"), 2, ["nowhere"]),
         (("-o", "tiny.toml"), 2, ["tiny.toml", "is not a fit result"]),
