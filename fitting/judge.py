@@ -13,6 +13,16 @@ from fitting.solid_angle import incidence_labels
 
 _MAX_FOLDS = 10
 
+# Of `Scores`, in words.
+MEANING = {
+    "l2": "RMS of the distance over channels, 1/sr",
+    "l2cos": "RMS, times the cosine, 1/sr",
+    "log1p": "RMS of log(1 + f cos)",
+    "asinh": "RMS of asinh(f cos / median): relative where bright",
+    "cbrt": "RMS of the cube root of f cos / median",
+    "chi2_reduced": "mean of (residual / standard uncertainty)^2",
+}
+
 
 def residuals(
     rows: Rows, predicted: np.ndarray, objective: str, options: FitOptions

@@ -14,6 +14,7 @@ _COMMANDS = {
     "tradeoff": "Measure speed against accuracy: of models, and of choices inside one.",
     "choose": "Keep the cheapest model that a scene cannot tell from the data.",
     "plot": "Draw figures of a fit: slices, lobes, residuals, albedo, spectra, ...",
+    "report": "Write a fit as one HTML file: verdict, figures, parameters, how to cite.",
     "convert": "Write measurements in another format.",
     "export": "Write a fit for a renderer, an optical design program, or as a table.",
     "models": "List the models, or describe one in full.",
@@ -79,6 +80,12 @@ Examples:
   brdf plot paint.fit.json slices --channel '450 nm' -o slices.pdf
   brdf plot paint.fit.json -o paint.pdf       all, a page each
   brdf plot paint.fit.json --data moved/paint.astm
+""",
+    "report": """\
+Examples:
+  brdf report paint.fit.json                       paint.report.html
+  brdf report paint.fit.json other.fit.json        compared with another fit
+  brdf report paint.fit.json --data moved/paint.astm -o reports
 """,
     "convert": "Example: brdf convert paint.astm paint.csv\n",
     "export": """\

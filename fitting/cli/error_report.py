@@ -8,20 +8,13 @@ from collections.abc import Sequence
 from rich.console import Console
 
 from fitting.cli.terminal import heading, table
+from fitting.judge import MEANING
 from fitting.quantities import degrees, number, percent, shown_channels
 from fitting.result import AngleError, ChannelError, Colour, FitResult, Scores
 
 _MOST_ANGLES = 12
 _BIN_DEG = 10.0
 _LAST_BIN = int(180.0 / _BIN_DEG) - 1
-_MEANING = {
-    "l2": "RMS of the distance over channels, 1/sr",
-    "l2cos": "RMS, times the cosine, 1/sr",
-    "log1p": "RMS of log(1 + f cos)",
-    "asinh": "RMS of asinh(f cos / median): relative where bright",
-    "cbrt": "RMS of the cube root of f cos / median",
-    "chi2_reduced": "mean of (residual / standard uncertainty)^2",
-}
 
 
 def show(out: Console, result: FitResult, everything: bool = False) -> None:
@@ -46,7 +39,7 @@ def scores(out: Console, found: Scores, objective: str) -> None:
     out.print(heading("Distance from the data"))
     rows = table("score", "value", "meaning", left=1)
     rows.columns[2].justify = "left"
-    for name, meaning in _MEANING.items():
+    for name, meaning in MEANING.items():
         value = getattr(found, name)
         if value is not None:
             minimised = name.removesuffix("_reduced") == objective

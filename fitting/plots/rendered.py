@@ -140,6 +140,8 @@ def draw_compared(
             ScalarMappable(norm, MAGNITUDE), ax=row[2], extend="max", shrink=0.8,
             label="CIEDE2000",
         )  # fmt: skip
+    means = " and ".join(f"{one.mean:.2g} in {one.name}" for one in scenes)
+    out.set_label(f"Mean colour difference of data and fit (CIEDE2000): {means}")
     said = list(notes)
     if not all(one.known.all() for one in scenes):
         said.append(

@@ -1,0 +1,129 @@
+"""What ``brdf report`` does: find the data, draw, write one file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from data_formats.source import replacing
+from fitting.cli import reading
+from fitting.cli.failures import UsageError
+from fitting.cli.flags import Flags
+from fitting.cli.terminal import stderr
+from fitting.cli.work import Work
+from fitting.plots.find_data import DataNotFound, find_data, read_again
+from fitting.quantities import channel_span
+from fitting.report import Reported, page
+from fitting.report.figures import FIRST, MORE
+from fitting.result import FitResult, load_result
+
+_SUFFIXES = (".html", ".htm")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The options of the command line."""
+
+    results: tuple[Path, ...]
+    data: tuple[Path, ...]
+    output: Path | None
+    viewer: bool
+    data_format: str | None
+    reader: Mapping[str, Any]
+
+    @property
+    def target(self) -> Path:
+        """Where the report goes."""
+        stem = self.results[0].name.removesuffix(".json").removesuffix(".fit")
+        name = f"{stem}.report.html"
+        if self.output is None:
+            return Path(name)
+        return self.output / name if self.output.is_dir() else self.output
+
+
+class Done(msgspec.Struct, frozen=True):
+    """What the command did; ``without_data`` says why a measurement is not in it."""
+
+    path: str
+    level: str
+    verdict: str
+    without_data: str | None
+
+
+def check(asked: Asked) -> None:
+    """Raises `UsageError` for what makes no sense, before any work."""
+    target = asked.target
+    if target.suffix.lower() not in _SUFFIXES:
+        raise UsageError(f"-o {target}: expected a name that ends in .html, or a folder")
+    if not target.parent.is_dir():
+        raise UsageError(f"{target}: the folder {target.parent} does not exist")
+    if not os.access(target.parent, os.W_OK):
+        raise UsageError(
+            f"{target.parent.resolve()} cannot be written to; choose another with -o"
+        )
+    if asked.data_format is not None and not asked.data:
+        raise UsageError("--data-format is that of --data; give that, too")
+    twice = [p for k, p in enumerate(asked.results) if p in asked.results[:k]]
+    if twice:
+        raise UsageError(f"{twice[0]}: given twice")
+
+
+def load(asked: Asked) -> list[FitResult]:
+    """All results; raises `ResultError`."""
+    return [load_result(path) for path in asked.results]
+
+
+def run(results: Sequence[FitResult], asked: Asked, flags: Flags) -> Done:
+    """Draw and write. Without the measurement the report says what it lacks."""
+    every = [
+        _reported(r, path, asked, first=k == 0)
+        for k, (r, path) in enumerate(zip(results, asked.results, strict=True))
+    ]
+    first = every[0]
+    console = stderr()
+    if first.why and not flags.quiet:
+        without = "without measured points: " if first.measurement is None else ""
+        console.print(f"{without}{first.why}", soft_wrap=True)
+    total = len(FIRST) + len(MORE)
+    with Work(console, total, quiet=flags.quiet or not console.is_terminal) as work:
+        drawn = 0
+
+        def at(name: str) -> None:
+            nonlocal drawn
+            work.at(name, drawn, 0)
+            drawn += 1
+
+        html = page(every, progress=at)
+    with replacing(asked.target) as beside:
+        beside.write_text(html, encoding="utf-8", newline="\n")
+    said = first.verdict
+    return Done(
+        str(asked.target), said.level, said.headline,
+        first.why if first.measurement is None else None,
+    )  # fmt: skip
+
+
+def _reported(result: FitResult, path: Path, asked: Asked, *, first: bool) -> Reported:
+    """A result with its measurement, and what is to be said about that."""
+    if first and asked.data:
+        found = reading.read_files(asked.data, asked.data_format, asked.reader)
+        theirs, ours = ([c.name for c in o.channels] for o in (found, result))
+        if theirs != ours:
+            raise UsageError(
+                f"--data {asked.data[0]}: it has {channel_span(theirs)} and the result has "
+                f"{channel_span(ours)}; they must be the same"
+            )
+        return Reported(result, found, read_again(result, found) or "", path.name)
+    try:
+        found = find_data(result, path, reader=asked.reader)
+    except DataNotFound as error:
+        return Reported(result, None, str(error), path.name)
+    different = read_again(result, found)
+    if different:
+        return Reported(result, None, different, path.name)
+    return Reported(result, found, "", path.name)

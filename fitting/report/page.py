@@ -1,0 +1,79 @@
+"""From sections to one HTML file."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from importlib.resources import files
+
+from fitting.report.reported import Reported
+
+_SCRIPT = re.compile(r"<script\b[^>]*>(.*?)</script>", re.DOTALL | re.IGNORECASE)
+_TEMPLATES = ("page.html", "blocks.html")
+
+
+class ReportMissing(ImportError):
+    """jinja2 is not installed."""
+
+
+def require() -> None:
+    """Raises `ReportMissing` without jinja2, in a sentence that says what to do."""
+    try:
+        import jinja2  # noqa: F401
+    except ImportError as error:
+        raise ReportMissing(
+            "reports need jinja2, and their figures matplotlib: pip install "
+            "'brdf-fitting[report]'"
+        ) from error
+
+
+def page(
+    every: Sequence[Reported],
+    *,
+    viewer: str = "",
+    progress: Callable[[str], None] = lambda _: None,
+) -> str:
+    """The report of a result, and of others to compare with, as HTML.
+
+    ``viewer`` is HTML of this program to be embedded, with its own scripts; ``progress`` is
+    called with the name of every figure that is drawn. Nothing is loaded from anywhere, and
+    the page forbids it itself. Raises `ReportMissing`.
+    """
+    require()
+    from jinja2 import DictLoader, Environment, StrictUndefined
+
+    from fitting.report.sections import heading, sections
+
+    folder = files("fitting.report") / "templates"
+    texts = {name: (folder / name).read_text("utf-8") for name in _TEMPLATES}
+    environment = Environment(
+        loader=DictLoader(texts), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    title, subtitle = heading(every[0])
+    return environment.get_template("page.html").render(
+        title=title,
+        subtitle=subtitle,
+        sections=sections(every, viewer, progress),
+        style=(folder / "style.css").read_text("utf-8"),
+        policy=policy(viewer),
+        program=f"brdf-fitting {version('brdf-fitting')}",
+        source=every[0].file,
+    )
+
+
+def policy(viewer: str) -> str:
+    """The page's own Content-Security-Policy: no network, no scripts but those named."""
+    scripts = " ".join(f"'sha256-{_digest(text)}'" for text in _SCRIPT.findall(viewer))
+    return (
+        "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; "
+        f"script-src {scripts or chr(39) + 'none' + chr(39)}; base-uri 'none'; "
+        "form-action 'none'"
+    )
+
+
+def _digest(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
