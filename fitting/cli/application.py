@@ -8,6 +8,7 @@ from cyclopts import App
 
 _COMMANDS = {
     "fit": "Fit models to measured reflectance or transmittance and judge the result.",
+    "batch": "Fit many files, each for itself, by many processes or machines.",
     "info": "Say what is in a file: geometry, coverage, values, quality.",
     "score": "Measure a fit result against a file, without fitting.",
     "reflectance": "Reflectances, transmittances and colours of a fit or of a file.",
@@ -42,6 +43,24 @@ Examples:
   brdf fit paint.astm -m 'eon + ggx' --fix ggx.f90=1 --max-theta 75
   brdf fit foil_r.astm foil_t.astm          reflection and transmission together
   brdf fit paint.astm --json > paint.json   for programs
+""",
+    "batch": """\
+Examples:
+  brdf batch 'data/*.astm' -o results/            every file by itself, a process per core
+  brdf batch 'data/*.astm' -o results/ --resume   goes on, however it was ended
+  brdf batch 'data/**/*.csv' -m 'lambert + ggx' --no-cv --workers 8
+  brdf batch 'data/*.astm' --scheduler local      dask on this machine
+  brdf batch 'data/*.astm' --scheduler tcp://login1:8786
+
+The last one uses a dask scheduler that runs, whose workers see the same files; under Slurm:
+
+  from dask_jobqueue import SLURMCluster
+  cluster = SLURMCluster(cores=16, processes=16, memory="32GB", walltime="02:00:00")
+  cluster.scale(jobs=8)
+  print(cluster.scheduler_address)                # for --scheduler
+  input("Enter ends it: ")
+
+Exit code 1 of this command: a file failed, or its fit did not converge.
 """,
     "info": "Example: brdf info paint.astm\n",
     "score": "Example: brdf score other_sample.astm paint.fit.json\n",

@@ -1,6 +1,8 @@
-"""The options of `brdf fit` as they are written on the command line."""
+"""The options of `brdf fit` as they are written on the command line.
 
-from __future__ import annotations
+Annotations are objects here, not text: other commands inherit them in modules that do not
+know the names.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -11,6 +11,8 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
+from fitting.batch.threads import cores, same_sums
+
 OVERRIDE = "BRDF_CACHE_DIR"
 _JAX_OWN = "JAX_COMPILATION_CACHE_DIR"
 
@@ -37,13 +39,20 @@ def is_writable(folder: Path) -> bool:
     return os.access(folder, os.W_OK | os.X_OK)
 
 
+def writable_cache() -> Path | None:
+    """The cache folder, made if need be, or None if there is to be none or cannot be."""
+    folder = cache_folder()
+    return folder if folder is not None and is_writable(folder) else None
+
+
 def set_up() -> None:
     """Settle JAX's platform and cache; before the first computation, once or again."""
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
+    same_sums(cores())
     import jax
 
-    folder = cache_folder()
-    if folder is None or not is_writable(folder):
+    folder = writable_cache()
+    if folder is None:
         return
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
