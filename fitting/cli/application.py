@@ -15,6 +15,7 @@ _COMMANDS = {
     "tradeoff": "Measure speed against accuracy: of models, and of choices inside one.",
     "choose": "Keep the cheapest model that a scene cannot tell from the data.",
     "plot": "Draw figures of a fit: slices, lobes, residuals, albedo, spectra, ...",
+    "view": "Write a web page to play with fits: lobe, lit sphere, slices, sliders.",
     "report": "Write a fit as one HTML file: verdict, figures, parameters, how to cite.",
     "convert": "Write measurements in another format.",
     "export": "Write a fit for a renderer, an optical design program, or as a table.",
@@ -90,6 +91,13 @@ Examples:
 
 A scene of your own: brdf scene studio --write mine.toml, then change it.
 Exit code 1 of this command: no candidate is within the tolerance.
+""",
+    "view": """\
+Examples:
+  brdf view paint.fit.json                    the page paint.view.html
+  brdf view paint.fit.json --open             and a browser that shows it
+  brdf view ggx.fit.json ward.fit.json        two fits side by side
+  brdf view paint.fit.json --data moved/paint.astm -o paint.html
 """,
     "plot": """\
 Examples:

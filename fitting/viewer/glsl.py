@@ -64,6 +64,16 @@ def shader(model: Model) -> Shader:
         traced, tree = jax.make_jaxpr(function, return_shape=True)(
             [some] * len(names), [some] * len(_DIRECTIONS)
         )
+    try:
+        return _translated(names, traced, len(tree[1]))
+    except TranslationError as error:
+        raise TranslationError(
+            f"the model {model.expression!r} cannot be evaluated in a web page: it has "
+            f"{error}"
+        ) from error
+
+
+def _translated(names: tuple[str, ...], traced: ClosedJaxpr, count: int) -> Shader:
     code = Code()
     inputs: list[Value] = [Scalar(f"p[{k}]", "float", True) for k in range(len(names))]
     inputs = [
@@ -71,7 +81,6 @@ def shader(model: Model) -> Shader:
     ]
     inputs += [Scalar(name, "float", False) for name in _DIRECTIONS]
     outputs = _run(code, traced.jaxpr, traced.consts, inputs)
-    count = len(tree[1])
     return _assembled(code, names, outputs[:count], outputs[count:])
 
 

@@ -2,7 +2,7 @@
 
 import { aroundCentre, dot, fromAngles, gauss, graded, gradedSlope, Pairs, smoothExit } from "./directions.js";
 import { radians, short } from "./numbers.js";
-import { DASHES, LINES } from "./palette.js";
+import { DASHES, lineColour } from "./palette.js";
 import { axes, curve } from "./plot.js";
 
 const THETAS = [0, 10, 20, 30, 40, 50, 57, 64, 70, 75, 80, 84, 87];
@@ -29,7 +29,9 @@ export class Albedo {
       yLabel: view.through ? "transmittance" : "albedo", xTicks: [0, 15, 30, 45, 60, 75, 90],
     });
     if (top > 1) curve(plot, [0, 90], [1, 1], getComputedStyle(this.canvas).color, [2, 4]);
-    channels.forEach((_, k) => curve(plot, THETAS, found[k], LINES[k], DASHES[k]));
+    channels.forEach((_, k) => {
+      curve(plot, THETAS, found[k], lineColour(this.canvas, k), DASHES[k]);
+    });
     const at = channels.map((_, k) => short(interpolated(found[k], view.theta), 3)).join(", ");
     this.caption.textContent = view.theta <= THETAS.at(-1)
       ? `at ${short(view.theta, 3)}°: ${at}` : "";

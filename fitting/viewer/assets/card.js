@@ -27,12 +27,12 @@ export class Card {
     heading.append(name, model);
     const pictures = document.createElement("div");
     pictures.className = "viewer-pictures";
-    this.sphere = new Sphere(fit, glsl, this.movable(
+    this.sphere = new Sphere(fit, glsl, ...this.movable(
       pictures, "Lit sphere", "drag, or use the arrow keys, to move the light",
       (dx, dy) => view.turnLight(dx, dy), "sphere",
     ));
-    this.lobe = new Lobe(fit, glsl, this.movable(
-      pictures, "Lobe", "drag, or use the arrow keys, to turn it; circles are measured",
+    this.lobe = new Lobe(fit, glsl, ...this.movable(
+      pictures, "Lobe", "drag, or use the arrow keys, to turn it",
       (dx, dy) => view.turnCamera(dx, dy), "camera",
     ));
     const plot = (Kind, title) => {
@@ -76,7 +76,7 @@ export class Card {
   // A picture that is turned by pointer and keys.
   movable(box, title, help, turn, what) {
     const { canvas, caption } = this.figure(box, title);
-    caption.textContent = help;
+    canvas.title = help;
     canvas.tabIndex = 0;
     canvas.setAttribute("role", "application");
     canvas.setAttribute("aria-label", `${title} of ${this.fit.name}: ${help}`);
@@ -96,6 +96,6 @@ export class Card {
       event.preventDefault();
       move(...step);
     });
-    return canvas;
+    return [canvas, caption];
   }
 }

@@ -68,7 +68,7 @@ export class Controls {
 
   // Angles of incidence that were measured.
   jump(thetas) {
-    const input = this.choice("measured", "measured at", [
+    const input = this.choice("measured", "Measured at", [
       ["", "…"], ...thetas.map((t) => [String(t), `${short(t, 3)}°`]),
     ]);
     input.addEventListener("change", () => {

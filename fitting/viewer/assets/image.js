@@ -1,12 +1,13 @@
 // The image slice: values over theta_h and theta_d at phi_d = 90 degrees, as colours.
 
 import { Pairs } from "./directions.js";
-import { short } from "./numbers.js";
-import { viridis } from "./palette.js";
+import { radians, short } from "./numbers.js";
+import { decadesOf, viridis } from "./palette.js";
 import { axes } from "./plot.js";
 
 const CELLS = 72;
-const DECADES = 5;
+// Values next to grazing would take the scale for themselves.
+const STEEPEST = Math.cos(radians(80));
 
 export class ImageSlice {
   constructor(fit, glsl, canvas, caption) {
@@ -33,12 +34,11 @@ export class ImageSlice {
     );
     const pen = this.picture.getContext("2d");
     const image = pen.createImageData(CELLS, CELLS);
-    let largest = 1e-30;
-    for (let k = 0; k < pairs.count; ++k) largest = Math.max(largest, values[4 * k + 3]);
+    const { largest, decades } = extent(pairs, values);
     for (let k = 0; k < pairs.count; ++k) {
       const below = pairs.sources[4 * k + 2] <= 0 || pairs.detectors[4 * k + 2] <= 0;
       const f = Math.max(values[4 * k + 3], 0);
-      const share = view.logarithmic ? 1 + Math.log10(f / largest) / DECADES : f / largest;
+      const share = view.logarithmic ? 1 + Math.log10(f / largest) / decades : f / largest;
       image.data.set(below ? [0, 0, 0, 0] : [...viridis(share), 255], 4 * k);
     }
     pen.putImageData(image, 0, 0);
@@ -57,9 +57,22 @@ export class ImageSlice {
     for (const t of [0, 2, 10, 30, 60, 90]) {
       plot.pen.fillText(short(t), plot.across(root(t)), box.bottom + 5);
     }
-    const lowest = view.logarithmic ? short(largest / 10 ** DECADES, 2) : "0";
+    const lowest = view.logarithmic ? short(largest / 10 ** decades, 2) : "0";
     this.caption.textContent = `dark ${lowest} to bright ${short(largest, 3)} 1/sr; φd = 90°`;
   }
+}
+
+// The scale of the colours.
+function extent(pairs, values) {
+  let [least, largest] = [Infinity, 1e-30];
+  for (let k = 0; k < pairs.count; ++k) {
+    const f = values[4 * k + 3];
+    const z = Math.min(pairs.sources[4 * k + 2], pairs.detectors[4 * k + 2]);
+    if (!(f > 0) || z < STEEPEST) continue;
+    least = Math.min(least, f);
+    largest = Math.max(largest, f);
+  }
+  return { largest, decades: decadesOf(Math.min(least, largest), largest) };
 }
 
 // wi and wo of a half vector and a difference angle across the plane of both normals.

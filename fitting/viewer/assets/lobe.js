@@ -3,21 +3,21 @@
 import { aroundCentre, fromAngles, graded, Pairs, range, smoothExit } from "./directions.js";
 import { beginPicture, buildProgram, floatTexture, useProgram } from "./gl.js";
 import { radians, short } from "./numbers.js";
-import { themed, viridis } from "./palette.js";
+import { decadesOf, themed, viridis } from "./palette.js";
 import { line, surface } from "./plot.js";
 
 const RINGS = 97;
 const AZIMUTHS = 144;
-const DECADES = 5;
-const SCALE = 0.86;
+const SCALE = 0.9;
 // How far from the shown direction of incidence measured ones may be.
 const NEAR_DEG = 1.0;
 
 export class Lobe {
-  constructor(fit, glsl, canvas) {
+  constructor(fit, glsl, canvas, caption) {
     const { gl } = fit.shader;
     this.fit = fit;
     this.canvas = canvas;
+    this.caption = caption;
     this.program = buildProgram(gl, glsl.lobe_vertex, glsl.lobe_fragment);
     const colours = new Float32Array(4 * 256);
     for (let k = 0; k < 256; ++k) colours.set(viridis(k / 255).map((c) => c / 255), 4 * k);
@@ -37,7 +37,7 @@ export class Lobe {
     const solo = view.soloOf(fit);
     const mesh = this.evaluate(wi, solo);
     const { pen, width, height, scale } = surface(canvas);
-    const project = camera(view, width, height);
+    const project = camera(view, width, height, this.through.length > 1);
     ground(pen, canvas, project);
     const [w, h] = [Math.round(width * scale), Math.round(height * scale)];
     beginPicture(gl, w, h);
@@ -45,15 +45,15 @@ export class Lobe {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffer);
     useProgram(gl, this.program, {
       detectors: fit.shader.textures.detectors, values: mesh.texture, palette: this.palette,
-      camera: project.matrix, largest: mesh.largest, decades: DECADES, width: mesh.width,
+      camera: project.matrix, largest: mesh.largest, decades: mesh.decades, width: mesh.width,
       logarithmic: view.logarithmic ? 1 : 0,
     });
     gl.drawElements(gl.TRIANGLES, this.indices.length, gl.UNSIGNED_INT, 0);
     pen.drawImage(gl.canvas, 0, 0, width, height);
     arrow(pen, project, wi);
-    this.points(pen, project, view, mesh.largest, solo);
-    this.canvas.title = `largest ${short(mesh.largest, 3)} 1/sr`;
-    this.largest = mesh.largest;
+    this.points(pen, project, view, mesh, solo);
+    const scaled = view.logarithmic ? `logarithmic over ${short(mesh.decades, 2)} decades` : "linear";
+    this.caption.textContent = `to ${short(mesh.largest, 3)} 1/sr, ${scaled}${this.measured}`;
   }
 
   // Values on the mesh of directions, and the largest of them.
@@ -69,16 +69,17 @@ export class Lobe {
     const mesh = fit.shader.evaluateToTexture(
       pairs.sources, pairs.detectors, fit.colourSums(solo),
     );
-    mesh.largest = 1e-30;
-    for (let k = 0; k < pairs.count; ++k) {
-      mesh.largest = Math.max(mesh.largest, mesh.values[4 * k + 3]);
-    }
+    const all = Array.from({ length: pairs.count }, (_, k) => mesh.values[4 * k + 3]);
+    const positive = all.filter((f) => f > 0).sort((a, b) => a - b);
+    mesh.largest = positive.at(-1) ?? 1e-30;
+    mesh.decades = decadesOf(positive[Math.floor(0.02 * positive.length)] ?? 1e-30, mesh.largest);
     return mesh;
   }
 
-  points(pen, project, view, largest, solo) {
+  points(pen, project, view, { largest, decades }, solo) {
     const { fit } = this;
     const rows = fit.rows((ti, pi) => view.isNear(fit, ti, pi, radians(NEAR_DEG)));
+    this.measured = rows.length ? `; ${rows.length} measured points` : "";
     pen.strokeStyle = themed(this.canvas, "ink");
     pen.lineWidth = 1;
     pen.globalAlpha = rows.length > 500 ? 0.45 : 0.9;
@@ -87,7 +88,7 @@ export class Lobe {
       if (!(f > 0)) continue;
       const [, pi, tr, pr] = fit.angles.subarray(4 * row, 4 * row + 4);
       const turn = fit.anisotropic ? 0 : radians(view.phi) - pi;
-      const far = height(f, largest, view.logarithmic);
+      const far = length(f / largest, view.logarithmic ? decades : 0);
       const [x, y] = project.at(fromAngles(tr, pr + turn).map((v) => v * far));
       pen.beginPath();
       pen.arc(x, y, 1.8, 0, 2 * Math.PI);
@@ -97,9 +98,9 @@ export class Lobe {
   }
 }
 
-function height(f, largest, logarithmic) {
-  if (!logarithmic) return f / largest;
-  return Math.min(Math.max(1 + Math.log10(f / largest) / DECADES, 0), 1.2);
+// How far out a share of the largest value is; without decades the scale is linear.
+function length(share, decades) {
+  return decades ? Math.min(Math.max(1 + Math.log10(share) / decades, 0), 1.2) : share;
 }
 
 function triangles(sides) {
@@ -117,23 +118,26 @@ function triangles(sides) {
 }
 
 // An orthographic view of the unit ball: x to the right, z up, turned by the camera.
-function camera({ cameraTurn, cameraHeight }, width, height) {
+function camera({ cameraTurn, cameraHeight }, width, height, both) {
   const [ca, sa] = [Math.cos(cameraTurn), Math.sin(cameraTurn)];
   const [ch, sh] = [Math.cos(cameraHeight), Math.sin(cameraHeight)];
   const right = [-sa, ca, 0];
   const up = [-sh * ca, -sh * sa, ch];
   const near = [ch * ca, ch * sa, sh];
-  const small = Math.min(width, height);
+  // Of half a ball, the middle of the picture is above its centre.
+  const small = Math.min(width, both ? height : (1 + 0.45 * ch) * height);
+  const sunk = both ? 0 : 0.17 * small * ch;
   const [fx, fy] = [(SCALE * small) / width, (SCALE * small) / height];
   const matrix = new Float32Array(16);
   for (let k = 0; k < 3; ++k) {
     matrix.set([fx * right[k], fy * up[k], -0.4 * near[k], 0], 4 * k);
   }
+  matrix[13] = (-2 * sunk) / height;
   matrix[15] = 1;
   const along = (v, axis) => v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2];
   const at = (v) => [
     width / 2 + (SCALE * small * along(v, right)) / 2,
-    height / 2 - (SCALE * small * along(v, up)) / 2,
+    height / 2 + sunk - (SCALE * small * along(v, up)) / 2,
   ];
   return { matrix, at };
 }

@@ -1,6 +1,6 @@
-// Colours that everyone tells apart: Okabe and Ito's for lines, viridis for magnitudes.
+// Colours that everyone tells apart: Okabe and Ito's for lines (in the style sheet), viridis
+// for magnitudes.
 
-export const LINES = ["#0072B2", "#D55E00", "#009E73"];
 export const DASHES = [[], [7, 3], [2, 3]];
 export const MARKS = ["circle", "square", "triangle"];
 
@@ -16,7 +16,16 @@ export function viridis(share) {
   return STOPS[k].map((low, c) => low + (at - k) * (STOPS[k + 1][c] - low));
 }
 
+// How much of the range of values is shown on a logarithmic scale: all of it and a little
+// more, within limits.
+export function decadesOf(least, largest) {
+  return Math.min(Math.max(1.3 * Math.log10(largest / Math.max(least, 1e-30)), 1), 5);
+}
+
 // A colour of the page's theme.
 export function themed(element, name) {
   return getComputedStyle(element).getPropertyValue(`--viewer-${name}`).trim();
 }
+
+// Of the curve of that number.
+export const lineColour = (element, k) => themed(element, `line-${k}`);

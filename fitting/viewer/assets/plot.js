@@ -124,16 +124,20 @@ function clipped(pen, box, draw) {
 }
 
 function decades([low, high]) {
+  const few = Math.log10(high / low) < 2.5;
   const out = [];
   const first = Math.ceil(Math.log10(low) - 1e-9), last = Math.floor(Math.log10(high) + 1e-9);
   const step = Math.max(Math.ceil((last - first) / 6), 1);
-  for (let k = first; k <= last; k += step) out.push(10 ** k);
-  return out;
+  for (let k = few ? first - 1 : first; k <= last; k += step) {
+    for (const m of few ? [1, 2, 5] : [1]) out.push(Number((m * 10 ** k).toPrecision(3)));
+  }
+  return out.filter((t) => t >= low && t <= high);
 }
 
 function power(value) {
   const k = Math.round(Math.log10(value));
-  if (k >= -3 && k <= 3) return short(value);
+  if (value >= 1e-3 && value <= 1e3) return short(value);
+  if (value !== Number(`1e${k}`)) return short(value, 1);
   const digits = "⁰¹²³⁴⁵⁶⁷⁸⁹";
   const raised = [...String(Math.abs(k))].map((d) => digits[Number(d)]).join("");
   return `10${k < 0 ? "⁻" : ""}${raised}`;

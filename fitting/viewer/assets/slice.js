@@ -2,7 +2,7 @@
 
 import { fromAngles, Pairs, range, smoothExit } from "./directions.js";
 import { degrees, radians, short } from "./numbers.js";
-import { DASHES, LINES, MARKS } from "./palette.js";
+import { DASHES, lineColour, MARKS } from "./palette.js";
 import { axes, curve, marks } from "./plot.js";
 
 const FARTHEST = 89.5;
@@ -46,8 +46,11 @@ export class Slice {
       yLabel: "1/sr",
       xTicks: [-90, -60, -30, 0, 30, 60, 90],
     });
-    channels.forEach((_, k) => curve(plot, angles, curves[k], LINES[k], DASHES[k]));
-    channels.forEach((_, k) => marks(plot, found.angles, points[k], LINES[k], MARKS[k]));
+    channels.forEach((_, k) => {
+      const colour = lineColour(this.canvas, k);
+      curve(plot, angles, curves[k], colour, DASHES[k]);
+      marks(plot, found.angles, points[k], colour, MARKS[k]);
+    });
     this.say(view, channels, found);
   }
 
@@ -74,7 +77,7 @@ export class Slice {
       const name = document.createElement("span");
       name.className = "viewer-key";
       name.textContent = `${marked[k]} ${fit.channels[c]}`;
-      name.style.color = LINES[k];
+      name.style.color = `var(--viewer-line-${k})`;
       this.caption.append(name, " ");
     });
     this.caption.append(fit.data ? pointsSaid(fit, view, found.rows.length) : "no measurement at hand");

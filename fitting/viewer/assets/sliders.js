@@ -50,7 +50,7 @@ export class Sliders {
   about(p, together) {
     const unit = p.unit ? ` ${p.unit}` : "";
     const said = [p.meaning];
-    if (together) said.push(`fitted in ${p.value.length} channels`);
+    if (together) said.push(`${p.value.length} channels, fitted${relative(p)}`);
     else {
       const c = p.value.length > 1 ? this.solo : 0;
       said.push(`fitted ${withUncertainty(p.value[c], p.sigma[c])}${unit}`);
@@ -93,6 +93,14 @@ export class Sliders {
       input.setAttribute("aria-valuetext", now.textContent);
     }
   }
+}
+
+// The standard uncertainties of all channels, relative to their values.
+function relative(p) {
+  const all = p.sigma.map((s, c) => (100 * s) / Math.abs(p.value[c])).filter((s) => s > 0 && s < Infinity);
+  if (!all.length) return "";
+  const [low, high] = [short(Math.min(...all), 2), short(Math.max(...all), 2)];
+  return low === high ? ` ± ${low} %` : ` ± ${low} to ${high} %`;
 }
 
 const isLogarithmic = (p) => !p.coefficient && p.scale === "log" && p.range[0] > 0;

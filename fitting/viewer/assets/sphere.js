@@ -4,9 +4,10 @@ import { buildProgram, beginPicture, useProgram } from "./gl.js";
 import { surface } from "./plot.js";
 
 export class Sphere {
-  constructor(fit, glsl, canvas) {
+  constructor(fit, glsl, canvas, caption) {
     this.fit = fit;
     this.canvas = canvas;
+    caption.textContent = "drag the light, or use the arrow keys";
     this.program = buildProgram(
       fit.shader.gl, glsl.screen, fit.shader.beginning + glsl.sphere,
     );
