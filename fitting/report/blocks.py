@@ -34,14 +34,17 @@ class Terms:
 
 @dataclass(frozen=True)
 class Table:
-    """Cells as text; the first of a row is its head, ``left`` columns are words."""
+    """Cells as text; the first of a row is its head.
+
+    Columns named in ``words`` are no numbers; ``marked`` is the row that matters most.
+    """
 
     kind: ClassVar = "table"
     id: str
     caption: str
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
-    left: int = 1
+    words: Sequence[str] = ()
     marked: int | None = None
 
     @property

@@ -20,11 +20,11 @@ def blocks(every: Sequence[Reported]) -> list[Block]:
         kept = [m.kept for m in models]
         objective = first.settings.objective
         title = f"Models fitted to these data in the same run ({objective})"
-        columns = ("model", "parameters", "error", "unseen", "largest albedo", "")
+        columns = ("model", "parameters", "error", "held-out", "largest albedo", "remark")
         rows = [(*_figures(m), _remark(m)) for m in models]
         out.append(
             Table(
-                "candidates", title, columns, rows,
+                "candidates", title, columns, rows, ("remark",),
                 marked=kept.index(True) if any(kept) else None,
             )
         )  # fmt: skip
@@ -52,11 +52,11 @@ def _results(every: Sequence[Reported]) -> list[Block]:
              albedo)
         )  # fmt: skip
     columns = (
-        "result", "model", "parameters", "objective", "error", "unseen", "l2 / (1/sr)",
+        "result", "model", "parameters", "objective", "error", "held-out", "l2 / (1/sr)",
         "mean CIEDE2000", "largest albedo",
     )  # fmt: skip
     title = "Results of this report, the first of which is told in full"
-    out: list[Block] = [Table("results", title, columns, rows, left=2)]
+    out: list[Block] = [Table("results", title, columns, rows, ("model", "objective"))]
     if len({r.result.data.sha256 for r in every}) > 1:
         out.append(Words("They are of different data: their errors do not compare."))
     elif len({r.result.data.rows_used for r in every}) > 1:

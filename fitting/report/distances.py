@@ -19,7 +19,7 @@ def tables(result: FitResult, prefix: str) -> list[Block]:
     title = f"Distance of fit and data in every objective; the fit makes {objective} small"
     out: list[Block] = [
         Table(
-            f"{prefix}scores", title, ("objective", "value", "meaning"), rows,
+            f"{prefix}scores", title, ("objective", "value", "meaning"), rows, ("meaning",),
             marked=minimised.index(True) if any(minimised) else None,
         )
     ]  # fmt: skip
@@ -44,28 +44,29 @@ def _angles(result: FitResult, prefix: str) -> list[Block]:
     # Many angles are held out in groups, which are no angles of the fit.
     same = held.keys() == {_key(a) for a in result.by_angle}
     columns = ["theta_i / deg", "rows", objective, "l2 / (1/sr)"]
-    columns += [f"unseen, {objective}", "unseen, l2"] if same else []
+    columns += [f"held-out {objective}", "held-out l2"] if same else []
     rows = [
         (degrees(a.theta_i_deg), str(a.rows), number(a.objective, 3), number(a.l2, 3),
-         *(_unseen(held[_key(a)]) if same else ()))
+         *(_held_out(held[_key(a)]) if same else ()))
         for a in result.by_angle
     ]  # fmt: skip
     title = "Errors by angle of incidence"
-    title += "; unseen: when fitted without that angle" if same else ""
+    title += "; held-out: when fitted without that angle" if same else ""
     out: list[Block] = [Table(f"{prefix}angles", title, columns, rows)]
     if validation is None:
         out.append(Words("Angles of incidence were not left out to see how they are met."))
         return out
     if not same:
         rows = [
-            (degrees(a.theta_i_deg), str(a.rows), *_unseen(a)) for a in validation.by_angle
+            (degrees(a.theta_i_deg), str(a.rows), *_held_out(a))
+            for a in validation.by_angle
         ]
         columns = ["around theta_i / deg", "rows", objective, "l2 / (1/sr)"]
         title = "Errors of groups of angles when fitted without them"
-        out.append(Table(f"{prefix}unseen", title, columns, rows))
+        out.append(Table(f"{prefix}held-out", title, columns, rows))
     out.append(
         Words(
-            f"Over all unseen angles {objective} is {number(validation.objective)}, "
+            f"Over all held-out angles {objective} is {number(validation.objective)}, "
             f"typically {number(validation.typical)} (geometric mean), and l2 is "
             f"{number(validation.l2)} per sr."
         )
@@ -77,7 +78,7 @@ def _key(a: AngleError) -> float:
     return round(a.theta_i_deg, 3)
 
 
-def _unseen(a: AngleError) -> tuple[str, str]:
+def _held_out(a: AngleError) -> tuple[str, str]:
     return number(a.objective, 3), number(a.l2, 3)
 
 

@@ -57,7 +57,7 @@ def pictures(about: Reported, progress: Callable[[str], None]) -> list[Block]:
 def _picture(name: str, figure: Figure, caption: str, about: Reported) -> Picture:
     width, height = figure.get_size_inches()
     return Picture(
-        id=f"figure-{name}",
+        id=name,
         uri=encoded(figure),
         width=round(width * _CSS_PIXELS_PER_INCH),
         height=round(height * _CSS_PIXELS_PER_INCH),

@@ -12,6 +12,8 @@ from importlib.resources import files
 from fitting.report.reported import Reported
 
 _SCRIPT = re.compile(r"<script\b[^>]*>(.*?)</script>", re.DOTALL | re.IGNORECASE)
+_UNIT, _NO_BREAK = re.compile(r"(?<=\d) (?=%|deg\b|nm\b|per sr)"), "\N{NO-BREAK SPACE}"
+_CODE = re.compile(r"`([^`]+)`")
 _TEMPLATES = ("page.html", "blocks.html")
 
 
@@ -25,8 +27,8 @@ def require() -> None:
         import jinja2  # noqa: F401
     except ImportError as error:
         raise ReportMissing(
-            "reports need jinja2, and their figures matplotlib: pip install "
-            "'brdf-fitting[report]'"
+            "reports need jinja2, which is not installed; install the extra `report`: "
+            "pip install 'brdf-fitting[report]'"
         ) from error
 
 
@@ -51,8 +53,9 @@ def page(
     texts = {name: (folder / name).read_text("utf-8") for name in _TEMPLATES}
     environment = Environment(
         loader=DictLoader(texts), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
+        trim_blocks=True, lstrip_blocks=True, finalize=_unbroken,
     )  # fmt: skip
+    environment.filters["code"] = _with_code
     title, subtitle = heading(every[0])
     return environment.get_template("page.html").render(
         title=title,
@@ -63,6 +66,18 @@ def page(
         program=f"brdf-fitting {version('brdf-fitting')}",
         source=every[0].file,
     )
+
+
+def _unbroken(value: object) -> object:
+    """Text with its numbers and their units on one line; what is escaped stays as it is."""
+    return _UNIT.sub(_NO_BREAK, value) if type(value) is str else value
+
+
+def _with_code(text: str) -> str:
+    """Escaped, and what is between backticks as code."""
+    from markupsafe import Markup, escape
+
+    return Markup(_CODE.sub(r"<code>\1</code>", str(escape(_unbroken(text)))))
 
 
 def policy(viewer: str) -> str:

@@ -32,7 +32,7 @@ def tables(result: FitResult, prefix: str) -> list[Block]:
             (p.name, cell(p, 0), _interval(p), p.unit, _range(p), p.meaning) for p in one
         ]
         columns = ("parameter", "value", "interval", "unit", "range", "meaning")
-        out.append(Table(f"{prefix}one", f"Parameters {where}", columns, rows, left=1))
+        out.append(Table(f"{prefix}one", f"Parameters {where}", columns, rows, columns[2:]))
     for first in range(0, len(each), _AT_ONCE):
         part = each[first : first + _AT_ONCE]
         rows = [(name, *(cell(p, c) for p in part)) for c, name in enumerate(channels)]
@@ -43,7 +43,7 @@ def tables(result: FitResult, prefix: str) -> list[Block]:
         rows = [(p.name, p.unit, _range(p), _state(p), p.meaning) for p in each]
         columns = ("parameter", "unit", "range", "state", "meaning")
         title = "What the parameters of each channel are"
-        out.append(Table(f"{prefix}are", title, columns, rows, left=5))
+        out.append(Table(f"{prefix}are", title, columns, rows, columns))
     return out
 
 

@@ -1,0 +1,85 @@
+"""What the tests of reports look at: fits of the bundled sample, and a browser."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from data_formats import Measurement, read
+from fitting.comparison import compare
+from fitting.report import Reported, page
+from fitting.result import FitResult
+from fitting.sample import sample_path
+
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "chrome")
+ARGUMENTS = (
+    "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--no-first-run",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def data() -> Measurement:
+    return read(sample_path())
+
+
+@pytest.fixture(scope="session")
+def kept(data: Measurement) -> FitResult:
+    """The better of two models; one of its parameters is fixed."""
+    models = ["lambert + ward", "lambert + ggx"]
+    found = compare(data, models, starts=2, colour=True, fix={"*.f90": 0.6})
+    assert found.kept.model == "lambert + ggx"
+    return found.kept
+
+
+@pytest.fixture(scope="session")
+def other(data: Measurement) -> FitResult:
+    found = compare(data, "lambert", cross_validate=False, objective="l2", starts=1)
+    return found.kept
+
+
+@pytest.fixture(scope="session")
+def coarse() -> Iterator[None]:
+    """Few pixels and few nodes for each: what is tested does not depend on them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fitting.plots.sphere._PIXELS", 12)
+        patch.setattr("fitting.plots.rendered._PER_PIXEL", 8)
+        yield
+
+
+@pytest.fixture(scope="session")
+def html(kept: FitResult, other: FitResult, data: Measurement, coarse: None) -> str:
+    """A report of everything: figures, several results."""
+    every = [
+        Reported(kept, data, "", "a.fit.json"),
+        Reported(other, data, "", "b.fit.json"),
+    ]
+    return page(every)
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Chromium, without a window and without the network."""
+    program = next(filter(None, map(shutil.which, CHROMIUM)), None)
+    if program is None:
+        pytest.skip(f"browser: none of {', '.join(CHROMIUM)} is installed")
+    if importlib.util.find_spec("playwright") is None:
+        pytest.skip("browser: the Python package playwright is not installed")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=program, args=list(ARGUMENTS))
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def written(html: str, tmp_path: Path) -> Path:
+    file = tmp_path / "a.report.html"
+    file.write_text(html, encoding="utf-8")
+    return file
