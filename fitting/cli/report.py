@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json as json_module
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -70,8 +71,8 @@ def report(
     if json:
         import msgspec
 
-        sys.stdout.buffer.write(msgspec.json.format(msgspec.json.encode(done), indent=1))
-        print()
+        plain = msgspec.to_builtins(done)
+        sys.stdout.write(json_module.dumps(plain, indent=1) + "\n")
         return 0
     print(done.path)
     return 0
