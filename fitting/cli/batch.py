@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 _WORK = Group("Who works", sort_key=7)
 _FILES = Group("Files", sort_key=6)
 _TERMINATED = 143
+_MOST_WORKERS = 4096
 
 
 @Parameter(name="*")
@@ -106,8 +107,7 @@ def batch(
     job = settle(choices or BatchChoices())
     if not files:
         raise failures.UsageError("batch: expected files, such as 'data/*.astm'")
-    if who.retries < 0:
-        raise failures.UsageError(f"--retries {who.retries}: expected 0 or more")
+    _check(who, job)
     from fitting.cli import batch_plan, batch_report, batch_run, terminal
     from fitting.cli.batch_progress import BatchProgress
     from fitting.cli.batch_recipe import recipe
@@ -121,7 +121,7 @@ def batch(
     quiet = flags.quiet or job.json
     todo = len(plan.todo)
     progress = BatchProgress(terminal.stderr(), todo, quiet=quiet, verbose=flags.verbose)
-    engine = _engine(who, job, todo, progress)
+    engine = _engine(who, todo, progress)
     for path, why in plan.redone.items():
         progress.say(f"again: {path}: {why}")
     progress.say(f"{todo} of {len(plan.items)} files to fit, by {engine.described}")
@@ -143,22 +143,28 @@ def batch(
     return _exit_code(ran)
 
 
-def _engine(who: Workers, job: Job, todo: int, progress: BatchProgress) -> Engine:
-    from fitting.batch import Cluster, Processes, Serial, cores
+def _check(who: Workers, job: Job) -> None:
     from fitting.cli.batch_recipe import own_files
 
-    if who.workers is not None and not 0 <= who.workers <= 4096:
+    if who.retries < 0:
+        raise failures.UsageError(f"--retries {who.retries}: expected 0 or more")
+    if who.workers is not None and not 0 <= who.workers <= _MOST_WORKERS:
         raise failures.UsageError(
-            f"--workers {who.workers}: expected a number from 0 to 4096"
+            f"--workers {who.workers}: expected a number from 0 to {_MOST_WORKERS}"
         )
+    for path in own_files(job):
+        if who.scheduler is not None and not path.expanduser().is_absolute():
+            raise failures.UsageError(
+                f"{path}: workers of a scheduler may be in another folder; give its full "
+                f"path, {path.absolute()}"
+            )
+
+
+def _engine(who: Workers, todo: int, progress: BatchProgress) -> Engine:
+    from fitting.batch import Cluster, Processes, Serial, cores
+
     workers = cores() if who.workers is None else who.workers
     if who.scheduler is not None:
-        for path in own_files(job):
-            if not path.expanduser().is_absolute():
-                raise failures.UsageError(
-                    f"{path}: workers of a scheduler may be in another folder; give its "
-                    f"full path, {path.absolute()}"
-                )
         return Cluster(who.scheduler, max(workers, 1), progress.say)
     return Processes(min(workers, max(todo, 1))) if workers else Serial()
 

@@ -159,7 +159,7 @@ class FitFile:
 
 
 def _tried(step: Callable[[], Any], item: FileItem) -> tuple[Any, str | None]:
-    """What a step gives, or the sentence that it raises, with the file as the user named it."""
+    """What a step gives, or the sentence that it raises; the file has the user's name."""
     from data_formats import MeasurementError
     from fitting.expression import ModelError
     from fitting.result import ResultError
