@@ -98,7 +98,7 @@ def run(results: Sequence[FitResult], asked: Asked, flags: Flags) -> Done:
             work.at(name, drawn, 0)
             drawn += 1
 
-        html = page(every, progress=at)
+        html = page(every, viewer=asked.viewer, progress=at)
     with replacing(asked.target) as beside:
         beside.write_text(html, encoding="utf-8", newline="\n")
     said = first.verdict

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 
+from fitting.report.blocks import Embedded
 from fitting.report.reported import Reported
 
 _SCRIPT = re.compile(r"<script\b[^>]*>(.*?)</script>", re.DOTALL | re.IGNORECASE)
@@ -35,14 +36,14 @@ def require() -> None:
 def page(
     every: Sequence[Reported],
     *,
-    viewer: str = "",
+    viewer: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> str:
     """The report of a result, and of others to compare with, as HTML.
 
-    ``viewer`` is HTML of this program to be embedded, with its own scripts; ``progress`` is
-    called with the name of every figure that is drawn. Nothing is loaded from anywhere, and
-    the page forbids it itself. Raises `ReportMissing`.
+    ``viewer`` adds the surface to be turned and lit, which is the only script there is;
+    ``progress`` is called with the name of every figure that is drawn. Nothing is loaded
+    from anywhere, and the page forbids it itself. Raises `ReportMissing`.
     """
     require()
     from jinja2 import DictLoader, Environment, StrictUndefined
@@ -57,12 +58,14 @@ def page(
     )  # fmt: skip
     environment.filters["code"] = _with_code
     title, subtitle = heading(every[0])
+    parts = sections(every, viewer, progress)
+    embedded = [b.html for s in parts for b in s.blocks if isinstance(b, Embedded)]
     return environment.get_template("page.html").render(
         title=title,
         subtitle=subtitle,
-        sections=sections(every, viewer, progress),
+        sections=parts,
         style=(folder / "style.css").read_text("utf-8"),
-        policy=policy(viewer),
+        policy=policy("".join(embedded)),
         program=f"brdf-fitting {version('brdf-fitting')}",
         source=every[0].file,
     )
@@ -80,9 +83,9 @@ def _with_code(text: str) -> str:
     return Markup(_CODE.sub(r"<code>\1</code>", str(escape(_unbroken(text)))))
 
 
-def policy(viewer: str) -> str:
+def policy(embedded: str) -> str:
     """The page's own Content-Security-Policy: no network, no scripts but those named."""
-    scripts = " ".join(f"'sha256-{_digest(text)}'" for text in _SCRIPT.findall(viewer))
+    scripts = " ".join(f"'sha256-{_digest(text)}'" for text in _SCRIPT.findall(embedded))
     return (
         "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; "
         f"script-src {scripts or chr(39) + 'none' + chr(39)}; base-uri 'none'; "

@@ -12,6 +12,7 @@ from fitting.report import (
     comparing,
     distances,
     figures,
+    looking,
     parameters,
     reproduce,
 )
@@ -19,7 +20,6 @@ from fitting.report.blocks import (
     Block,
     Bullets,
     Command,
-    Embedded,
     Folded,
     Section,
     Terms,
@@ -31,14 +31,14 @@ from fitting.result import FitResult
 
 
 def sections(
-    every: Sequence[Reported], viewer: str, progress: Callable[[str], None]
+    every: Sequence[Reported], viewer: bool, progress: Callable[[str], None]
 ) -> list[Section]:
-    """All sections; the first result is told in full. Without ``viewer`` there is none."""
+    """All sections; the first result is told in full, and looked at with ``viewer``."""
     about = every[0]
     result = about.result
     found = [
         Section("verdict", "Verdict", verdict(about)),
-        Section("look", "Look at it", [Embedded(viewer)] if viewer else []),
+        Section("look", "Look at it", looking.blocks(every) if viewer else []),
         Section("figures", "Figures", figures.pictures(about, progress)),
         Section("parameters", "Parameters", parameters.tables(result, "p-")),
         Section("determined", "What the data determine", _determined(result)),

@@ -55,12 +55,12 @@ def coarse() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def html(kept: FitResult, other: FitResult, data: Measurement, coarse: None) -> str:
-    """A report of everything: figures, several results."""
+    """A report of several results with all figures, and without a script."""
     every = [
         Reported(kept, data, "", "a.fit.json"),
         Reported(other, data, "", "b.fit.json"),
     ]
-    return page(every)
+    return page(every, viewer=False)
 
 
 @pytest.fixture(scope="session")
