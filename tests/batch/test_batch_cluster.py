@@ -35,9 +35,8 @@ def start(*argv: str, cwd: Path) -> subprocess.Popen[str]:
 @contextmanager
 def cluster(cwd: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
     """A scheduler's address, and the processes of workers without a nurse."""
-    running = [
-        start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", cwd=cwd)
-    ]
+    here = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+    running = [start("scheduler", *here, cwd=cwd)]
     log = cwd / "scheduler.log"
 
     def address() -> re.Match[str] | None:
@@ -91,6 +90,7 @@ def test_a_worker_is_killed_and_results_are_those_of_one_process(tmp_path: Path)
         out = tmp_path / "many"
         wait_for(lambda: len(list(out.glob("*.fit.json"))) >= 3, process)
         os.kill(workers[0].pid, signal.SIGKILL)
+        assert len(results(out)) < FILES
         said, err = process.communicate()
         assert process.returncode == 0, err
         assert workers[0].wait() == -signal.SIGKILL

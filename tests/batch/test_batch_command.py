@@ -115,7 +115,7 @@ def test_hdf5_holds_the_same_tables(done: Batch):
                 assert isinstance(data, h5py.Dataset)
                 texts = [row[column] for row in rows]
                 if h5py.check_string_dtype(data.dtype):
-                    assert list(data.asstr()) == texts
+                    assert list(data.asstr()[:]) == texts
                 else:
                     numbers = [float(t) if t else np.nan for t in texts]
                     np.testing.assert_array_equal(data, numbers)
