@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +20,8 @@ _NO_VALUE = re.compile(
     r"|[+-]?(?:1\.#\w*|nan(?:\(\w*\))?|inf(?:inity)?|n/?a|null|none|missing|-+)",
     re.ASCII | re.IGNORECASE,
 )
+_JSON_NUMBERS = msgspec.json.Decoder(list[float])
+_WHOLE_NEGATIVE_ZERO = re.compile(r"-0(?![.\deE])")
 
 
 @dataclass(frozen=True)
@@ -123,11 +126,13 @@ class Rows:
             return None
         if dialect.decimal_comma:
             joined = joined.replace(",", ".")
+        flat = _as_json(joined) if separator == "," else None
         try:
-            flat = np.array(list(map(float, joined.split(separator))), dtype=np.float64)
+            if flat is None:
+                flat = list(map(float, joined.split(separator)))
         except ValueError:
             return None
-        return flat.reshape(len(self.texts), width)
+        return np.array(flat, dtype=np.float64).reshape(len(self.texts), width)
 
     def _careful(
         self, text: str, line_number: int, dialect: Dialect, names: Sequence[str]
@@ -153,6 +158,19 @@ class Rows:
             _number(field, dialect, f"{where}, column {name}")
             for field, name in zip(fields, names, strict=True)
         ]
+
+
+def _as_json(fields: str) -> list[float] | None:
+    """Numbers between commas if they are also written as JSON has it, which most are.
+
+    The same values as by float(), in a third of the time; `None` if any is not.
+    """
+    if _WHOLE_NEGATIVE_ZERO.search(fields):  # an integer to JSON, without a sign
+        return None
+    try:
+        return _JSON_NUMBERS.decode(f"[{fields}]")
+    except msgspec.DecodeError:
+        return None
 
 
 def _number(field: str, dialect: Dialect, where: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import platform
 from collections.abc import Callable
@@ -248,6 +249,10 @@ def _colour(measurement: Measurement, rows: Rows, predicted: np.ndarray):
     return colour_difference(measurement.wavelengths, rows, predicted)
 
 
+# Looking a version up reads files, which many fits in a row would notice.
+_version = functools.cache(version)
+
+
 def _versions() -> dict[str, str]:
     packages = ("brdf-fitting", "jax", "jaxlib", "optimistix", "equinox", "numpy")
-    return {"python": platform.python_version()} | {p: version(p) for p in packages}
+    return {"python": platform.python_version()} | {p: _version(p) for p in packages}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from data_formats import Measurement
@@ -152,22 +154,26 @@ def _sparse_rings(theta: np.ndarray, delta: np.ndarray, ring: np.ndarray) -> np.
 
 def _widths(delta: np.ndarray, ring: np.ndarray) -> np.ndarray:
     """Width in azimuth of every row, rad."""
+    delta = np.asarray(delta, dtype=np.float64)
     side = np.sin(delta)
     one_sided = bool(np.all(side > -_SAME_ANGLE) or np.all(side < _SAME_ANGLE))
     out = np.empty(delta.size)
     for k in range(int(ring.max()) + 1):
         rows = np.flatnonzero(ring == k)
-        out[rows] = _azimuth_widths(delta[rows], one_sided)
+        out[rows] = _azimuth_widths(delta[rows].tobytes(), one_sided)
     return out
 
 
-def _azimuth_widths(delta: np.ndarray, one_sided: bool) -> np.ndarray:
+@functools.lru_cache(maxsize=256)
+def _azimuth_widths(raw: bytes, one_sided: bool) -> np.ndarray:
     """Width in azimuth between the mid-points to the neighbours on a ring, rad.
 
     A gap more than twice as wide as the usual one and as both of its neighbours is not
     bridged: what was not measured stands for nothing. Repeated directions share their
-    width.
+    width. ``raw`` holds float64 angles: most instruments scan every ring of every sample
+    alike, so that most rings have been seen before.
     """
+    delta = np.frombuffer(raw)
     angle = np.mod(delta, 2 * np.pi)
     if one_sided:
         angle = np.abs(np.arctan2(np.sin(delta), np.cos(delta)))
