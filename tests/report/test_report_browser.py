@@ -134,6 +134,7 @@ def test_paper(opened):
     """Everything is printed, also what is folded, but the contents and the skip link."""
     found = opened(viewport=DESK)
     found.emulate_media(media="print")
+    found.locator("details img").last.wait_for(state="visible")
     hidden = found.evaluate(
         """[...document.querySelectorAll('details img, details table')]
         .filter(e => !e.checkVisibility({contentVisibilityAuto: true}) ||

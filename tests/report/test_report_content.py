@@ -16,7 +16,8 @@ import pytest
 from html_tree import Node, parse, table
 
 from fitting.cli import main
-from fitting.report import Reported, page
+from fitting.report import Reported, comparing, page
+from fitting.report.blocks import Words
 from fitting.report.figures import FIRST, MORE
 from fitting.report.reproduce import command
 from fitting.result import DataNote, load_result
@@ -146,10 +147,23 @@ def test_several_results(tree, kept, other):
     first, second = table(tree, "results")
     assert (first["result"], second["result"]) == ("a.fit.json", "b.fit.json")
     assert shown(second["l2 / (1/sr)"], other.scores.l2)
-    assert "compare them by l2" in tree.by_id("comparison").text
     albedo = other.parameter("lambert.albedo")
     for row, value in zip(table(tree, "p1-each0"), albedo.value, strict=True):
         assert shown(row["lambert.albedo"].split(" ± ")[0], value)
+
+
+def test_results_that_do_not_compare(kept, other):
+    def said(second) -> str:
+        blocks = comparing.blocks([Reported(kept), Reported(second)])
+        return blocks[-1].text if isinstance(blocks[-1], Words) else ""
+
+    assert said(other) == ""
+    settings = change(other.settings, objective="l2")
+    assert "compare them by l2" in said(change(other, settings=settings))
+    fewer = change(other.data, rows_used=7)
+    assert "different rows" in said(change(other, data=fewer))
+    strange = change(other.data, sha256="0" * 64)
+    assert "different data" in said(change(other, data=strange))
 
 
 def test_figures_and_their_main_numbers(tree, kept):
@@ -199,7 +213,12 @@ def test_text_of_files_is_text(kept, no_figures):
         left_out=[EVIL], notes=[DataNote("x", EVIL, 2)],
     )  # fmt: skip
     evil = change(kept, identifiability=[EVIL], references=[EVIL], data=written)
-    tree = parse(page([Reported(evil, None, EVIL, EVIL)]))
+    every = [Reported(evil, None, EVIL, EVIL)]
+    with_viewer = parse(page(every))
+    assert not list(with_viewer.all("img"))
+    for script in with_viewer.all("script"):
+        assert "<script>alert" not in script.text
+    tree = parse(page(every, viewer=False))
     assert not list(tree.all("script", "img"))
     assert tree.one("h1").text == EVIL
     assert tree.one("title").text == f"{EVIL}: report of a BRDF fit"
@@ -240,9 +259,11 @@ def test_what_a_file_says_of_itself_is_cited(kept, data, no_figures):
     [
         ("-m", "lambert + ggx", "--fix", "ggx.f90=0.25", "--bounds", "ggx.alpha=:0.7",
          "--starts", "2", "--max-theta", "67.5", "--energy", "hard", "--no-cv"),
-        ("-m", "lambert + blinn_phong", "--tie", "blinn_phong.f90=2*blinn_phong.f0",
-         "--noise", "0.01,0.0003", "--objective", "chi2", "--weights", "rows", "--robust",
-         "--starts", "1", "--no-cv"),
+        pytest.param(
+            ("-m", "lambert + blinn_phong", "--tie", "blinn_phong.f90=2*blinn_phong.f0",
+             "--noise", "0.01,0.0003", "--objective", "chi2", "--weights", "rows",
+             "--robust", "--starts", "1", "--no-cv"), marks=pytest.mark.slow,
+        ),
     ],
 )  # fmt: skip
 def test_the_command_makes_the_same_fit_again(options, tmp_path, monkeypatch, capsys):
