@@ -15,8 +15,6 @@ from fitting.geometry import Geometry, from_components
 
 # Round lobes are interpolated better with less, those of Phong's kind with more.
 _SQUEEZE = 1.0 / 3.0
-# Steps.
-_NEAR = 8.0
 
 
 @dataclass(frozen=True)
@@ -93,21 +91,3 @@ class Chart:
             [r * np.cos(a.phi_h), r * np.sin(a.phi_h), s * np.cos(turn), s * np.sin(turn)],
             axis=-1,
         )
-
-    def images(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points and their images by the symmetries of an isotropic surface, and whose
-        they are.
-
-        Images lie beyond the plane of incidence, beyond the one across it, and beyond the
-        normal. The data have no edge there then, and a highlight is a summit. Those that
-        are within a few steps of their points are enough.
-        """
-        x, y, s = points.T
-        r, turn = np.hypot(x, y), np.arctan2(y, x)
-        found, index = [points], [np.arange(len(points))]
-        for t in (-turn, _SQUEEZE * np.pi - turn, turn + np.pi, np.pi - turn):
-            image = np.stack([r * np.cos(t), r * np.sin(t), s], axis=-1)
-            near = np.flatnonzero(np.linalg.norm(image - points, axis=1) < _NEAR)
-            found.append(image[near])
-            index.append(near)
-        return np.concatenate(found), np.concatenate(index)

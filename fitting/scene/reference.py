@@ -100,11 +100,7 @@ def interpolate(rows: Rows, *, isotropic: bool, seed: int = 0) -> Reference:
     neighbours = min(_NEIGHBOURS[isotropic], len(kept))
 
     def local(among: np.ndarray, columns: np.ndarray, smoothing: float) -> _Local:
-        at, own = points[among], among
-        if isotropic:
-            at, index = chart.images(at)
-            own = among[index]
-        return _Local(at, columns[own], neighbours, smoothing)
+        return _Local(points[among], columns[among], neighbours, smoothing)
 
     first = local(kept, np.arcsinh(value / scale), _FIRST_SMOOTHING)(points[held])
     relative, floor = _noise(value[held], scale * np.sinh(first))
