@@ -150,6 +150,8 @@ def _polar_angles(g: geometry.Geometry, size: int, model: Model):
     Only where a lobe evaluates costly functions of one angle, and where the angles are few
     as on a goniometer. Angles within 1e-10 rad are one.
     """
+    if not any(lobe.PER_ANGLE for lobe in model.lobes):
+        return None, None
     n = np.size(g.cos_i)
     theta = np.concatenate(
         [
@@ -160,8 +162,7 @@ def _polar_angles(g: geometry.Geometry, size: int, model: Model):
     _, first, index = np.unique(
         np.round(theta / _SAME_ANGLE), return_index=True, return_inverse=True
     )
-    wanted = any(lobe.PER_ANGLE for lobe in model.lobes)
-    if not wanted or first.size > min(_MOST_ANGLES, n // 2):
+    if first.size > min(_MOST_ANGLES, n // 2):
         return None, None
     room = max(16, 1 << (first.size - 1).bit_length())
     own = np.concatenate([theta[first], np.zeros(room - first.size)])

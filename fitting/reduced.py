@@ -2,25 +2,24 @@
 
 The model is ``f = sum_j a_j(x, u) B_j(u)`` with a handful of shape unknowns ``u`` shared by
 all channels and, per channel, coefficients ``x`` that enter (nearly) linearly. The
-Gauss-Newton matrix is therefore an arrow. It is accumulated from products of *features*,
-the basis functions and their derivatives, which do not depend on the channel: memory is
-that of the data, whatever the number of wavelengths, and the Jacobian (rows times channels
-by parameters) is never formed.
+Gauss-Newton matrix is therefore an arrow. It follows from sums over the rows of products of
+*features* (`fitting.row_sums`), which do not depend on the channel: memory is that of the
+data, whatever the number of wavelengths, and the Jacobian (rows times channels by
+parameters) is never formed.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
-from fitting import objectives, penalties, qp
-from fitting.geometry import Geometry, PolarAngles
+from fitting import objectives, penalties, qp, row_sums
+from fitting.geometry import Geometry
 from fitting.model import Model
 from fitting.parameters import Scale, to_value
 
@@ -157,59 +156,7 @@ class Blocks(NamedTuple):
     h_xx: Float[Array, "c m m"]
 
 
-def _dependents(problem: Problem) -> tuple[tuple[int, int], ...]:
-    """Pairs (basis function, shape unknown) where the one depends on the other."""
-    unknowns, model = problem.unknowns, problem.model
-    out: list[tuple[int, int]] = []
-    first = 0
-    for i, lobe in enumerate(model.lobes):
-        declared = {f"{model.labels[i]}.{p.name}" for p in lobe.parameters()}
-        own = {
-            index
-            for name, (index, _) in zip(
-                unknowns.shape_names, unknowns.shape_source, strict=True
-            )
-            if name in declared and index >= 0
-        }
-        count = model.n_basis(i)
-        out += [(first + j, k) for j in range(count) for k in sorted(own)]
-        first += count
-    return tuple(sorted(out, key=lambda jk: (jk[1], jk[0])))
-
-
-def _with_tangents(problem: Problem, functions, u: Array) -> Array:
-    """Functions of ``u`` (a tuple of arrays) and their needed derivatives, stacked."""
-    pairs = _dependents(problem)
-    value, derivatives = functions(u), {}
-    for k in range(problem.unknowns.n_shape):
-        unit = jnp.zeros_like(u).at[k].set(1.0)
-        value, derivatives[k] = jax.jvp(functions, (u,), (unit,))
-    return jnp.stack([*value, *(derivatives[k][j] for j, k in pairs)])
-
-
-def _features(problem: Problem, u: Array, functions: Callable) -> Array:
-    """Basis functions and their needed derivatives, ``(f, n)``, or ``(c, f, n)``.
-
-    ``functions(shape)`` gives one array per basis function.
-    """
-    unknowns = problem.unknowns
-
-    def of(constant: Array) -> Array:
-        return _with_tangents(problem, lambda v: functions(unknowns.shape(v, constant)), u)
-
-    if unknowns.spectral:
-        return jax.vmap(of)(unknowns.shape_constant.T)
-    return of(unknowns.shape_constant[:, 0])
-
-
-def _weighted(weights: Array, features: Array) -> Array:
-    """``(c, n)`` from weights ``(c, f)`` of features that channels share, or do not."""
-    if features.ndim == 2:
-        return weights @ features
-    return qp.product(jnp.swapaxes(features, 1, 2), weights)
-
-
-def _amplitudes(problem: Problem, u: Array, x: Array) -> tuple[Array, Array, Array]:
+def amplitudes(problem: Problem, u: Array, x: Array) -> tuple[Array, Array, Array]:
     """``a (c, b)`` and its derivatives in ``x (c, b, m)`` and ``u (c, b, k)``."""
     unknowns = problem.unknowns
 
@@ -230,101 +177,10 @@ def _amplitudes(problem: Problem, u: Array, x: Array) -> tuple[Array, Array, Arr
     return jax.vmap(one, (0, 0, along))(x, unknowns.coefficient_constant.T, fixed)
 
 
-def _residual(problem: Problem, f: Array, rows, linearised: Array):
-    """Residual and its slope in ``f``, both ``(c, n)``."""
-    kappa, weight, target, linear_target, linear_weight = rows
-    v = f * kappa
-    r = weight * (objectives.transform(problem.objective, v) - target)
-    linear = objectives.OBJECTIVES[problem.objective].linear
-    if linear and not problem.robust:
-        return r, weight * kappa
-    d = weight * kappa * objectives.slope(problem.objective, v)
-    if problem.robust:
-        r, inner = objectives.pseudo_huber(r, problem.robust_width)
-        d = d * inner
-    r = jnp.where(linearised, linear_weight * (f - linear_target), r)
-    return r, jnp.where(linearised, linear_weight, d)
-
-
-def _accumulate(
-    problem: Problem, u: Array, a: Array, linearised: Array
-) -> tuple[Array, Array, Array]:
-    """Gram matrix of the features per channel, gradient in feature space, and cost."""
-    n_basis = a.shape[1]
-    n_features = n_basis + len(_dependents(problem))
-    upper = jnp.triu_indices(n_features)
-
-    def contract(features: Array, r: Array, d: Array):
-        products = features[..., upper[0], :] * features[..., upper[1], :]
-        over_rows = jnp.swapaxes(products, -1, -2), jnp.swapaxes(features, -1, -2)
-        return (
-            _weighted(d * d, over_rows[0]),
-            _weighted(d * r, over_rows[1]),
-            jnp.sum(r * r, axis=1),
-        )
-
-    def chunk(rows):
-        geometry, *data = _located(problem, rows)
-        features = _features(problem, u, lambda s: problem.model.basis(s, geometry))
-        f = _weighted(a, features[..., :n_basis, :])
-        return contract(features, *_residual(problem, f, data, linearised))
-
-    total = _sum_chunks(problem, chunk)
-    if problem.penalised:
-        for penalty in penalties.of(problem):
-            features = _features(problem, u, penalty.functions)
-            r, d = penalty.residual(_weighted(a, features[..., :n_basis, :]))
-            total = jax.tree.map(jnp.add, total, contract(features, r, d))
-    gram, gradient, cost = total
-    full = jnp.zeros((gram.shape[0], n_features, n_features), gram.dtype)
-    full = full.at[:, upper[0], upper[1]].set(gram)
-    full = full.at[:, upper[1], upper[0]].set(gram)
-    return full, gradient, jnp.sum(cost)
-
-
-def _sum_chunks(problem: Problem, chunk: Callable):
-    """Sum of ``chunk(rows)`` over blocks of rows: memory does not grow with them."""
-    rows = (
-        problem.geometry,
-        problem.angle_rows,
-        problem.kappa,
-        problem.weight,
-        problem.target,
-        problem.linear_target,
-        problem.linear_weight,
-    )
-    blocks = problem.kappa.shape[0] // problem.chunk
-    if blocks == 1:
-        return chunk(rows)
-
-    def split(v: Array) -> Array:
-        parts = v.reshape(*v.shape[:-1], blocks, problem.chunk)
-        return jnp.moveaxis(parts, -2, 0)
-
-    def add(carry, part):
-        return jax.tree.map(jnp.add, carry, chunk(part)), None
-
-    chunks = jax.tree.map(split, rows)
-    zero = jax.tree.map(
-        lambda s: jnp.zeros(s.shape, s.dtype),
-        jax.eval_shape(chunk, jax.tree.map(lambda v: v[0], chunks)),
-    )
-    return jax.lax.scan(add, zero, chunks)[0]
-
-
-def _located(problem: Problem, rows: tuple) -> tuple:
-    """The rows, whose geometry now knows the table of the polar angles."""
-    geometry, angle_rows, *data = rows
-    if problem.angles is not None:
-        polar = PolarAngles(*problem.angles, *angle_rows)
-        geometry = dataclasses.replace(geometry, polar=polar)
-    return geometry, *data
-
-
-def evaluate(problem: Problem, u: Array, x: Array, linearised: Bool[Array, ""]) -> Blocks:
+def evaluate(problem: Problem, u: Array, x: Array) -> Blocks:
     """The blocks at ``(u, x)``, or at the best ``x`` if the problem `resolves`."""
-    a, da_dx, da_du = _amplitudes(problem, u, x)
-    gram, gradient, cost = _accumulate(problem, u, a, linearised)
+    a, da_dx, da_du = amplitudes(problem, u, x)
+    gram, gradient, cost = _all_sums(problem, u, a)
     gram = jnp.broadcast_to(gram, (x.shape[0], *gram.shape[1:]))
     n_basis, n_features = a.shape[1], gram.shape[1]
     if problem.resolves and x.shape[1]:
@@ -352,13 +208,22 @@ def evaluate(problem: Problem, u: Array, x: Array, linearised: Bool[Array, ""]) 
     )
 
 
+def _all_sums(problem: Problem, u: Array, a: Array) -> row_sums.Sums:
+    total = row_sums.over_rows(problem, u, a)
+    if problem.penalised:
+        for penalty in penalties.of(problem):
+            more = row_sums.of_functions(problem, u, a, *penalty)
+            total = row_sums.Sums(*map(jnp.add, total, more))
+    return total
+
+
 def _columns(problem: Problem, a: Array, da_dx: Array, da_du: Array) -> tuple[Array, Array]:
     """How columns of the Jacobian follow from features, ``(c, f, m)`` and ``(c, f, k)``.
 
     A column of the shape is the derivatives of the basis functions, weighted by their
     amplitudes.
     """
-    pairs = _dependents(problem)
+    pairs = row_sums.dependents(problem)
     n_basis = a.shape[1]
     extra = ((0, 0), (0, len(pairs)), (0, 0))
     to_x, to_u = jnp.pad(da_dx, extra), jnp.pad(da_du, extra)
@@ -375,21 +240,6 @@ def sum_over_rows(
     ``f, r, d (c, n)`` are value, residual and slope; ``columns_x (c, m, n)`` and
     ``columns_u (c, k, n)`` the derivatives of the value in the unknowns.
     """
-    a, da_dx, da_du = _amplitudes(problem, u, x)
-    to_x, to_u = _columns(problem, a, da_dx, da_du)
-
-    def chunk(rows):
-        geometry, *data = _located(problem, rows)
-        features = _features(problem, u, lambda s: problem.model.basis(s, geometry))
-        f = _weighted(a, features[..., : a.shape[1], :])
-        r, d = _residual(problem, f, data, jnp.asarray(False))
-        axes = "fn" if features.ndim == 2 else "cfn"
-        return function(
-            f,
-            r,
-            jnp.broadcast_to(d, r.shape),
-            jnp.einsum(f"cfm,{axes}->cmn", to_x, features),
-            jnp.einsum(f"cfk,{axes}->ckn", to_u, features),
-        )
-
-    return _sum_chunks(problem, chunk)
+    a, da_dx, da_du = amplitudes(problem, u, x)
+    columns = _columns(problem, a, da_dx, da_du)
+    return row_sums.by_function(problem, u, a, columns, function)

@@ -7,6 +7,7 @@ deal with the few shared shape unknowns only.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool, Float, Int
 
-from fitting import qp, reduced
+from fitting import qp, reduced, row_sums
 from fitting.reduced import Blocks, Problem
 
 MAX_STEPS = 200
@@ -25,6 +26,8 @@ _MAX_SHAPE_STEP = 1.5
 _FIRST_DAMPING = 1e-3
 _NOTICEABLE = 1e-10
 _MAX_IDLE = 8
+
+_compiled = functools.partial(eqx.filter_jit, compiler_options=row_sums.FAST)
 
 
 class Solution(NamedTuple):
@@ -179,7 +182,7 @@ class _PlainLoop(optx.AbstractAdjoint):
         return primal_fn((*inputs, loop))
 
 
-@eqx.filter_jit
+@_compiled
 def refine(
     problem: Problem,
     u0: Float[Array, " k"],
@@ -195,7 +198,7 @@ def refine(
         solver = ArrowLevenbergMarquardt(rtol)  # pyright: ignore[reportArgumentType]
 
     def fn(y, args):
-        return reduced.evaluate(args, y[0], y[1], jnp.asarray(False))
+        return reduced.evaluate(args, y[0], y[1])
 
     out = optx.least_squares(
         fn, solver, (u0, x0), args=problem, max_steps=MAX_STEPS,
@@ -208,24 +211,37 @@ def refine(
     )  # fmt: skip
 
 
-@eqx.filter_jit
+@_compiled
 def scan(
     problem: Problem, candidates: Float[Array, "p k"]
 ) -> tuple[Float[Array, " p"], Float[Array, "p c m"]]:
-    """Cost and coefficients of many shapes, with the residual linearised at the data."""
+    """Cost and coefficients of many shapes, with the residual linearised at the data.
+
+    Without penalties. The cost of a shape at which the model is not finite is infinite.
+    """
     unknowns = problem.unknowns
     c, m = problem.target.shape[0], unknowns.n_coefficients
 
-    def one(u: Array) -> tuple[Array, Array]:
-        x = jnp.zeros((c, m), dtype=u.dtype)
-        b = reduced.evaluate(problem, u, x, jnp.asarray(True))
-        if problem.resolves or m == 0:
-            return b.cost, b.x
-        best = qp.solve(
-            b.h_xx, qp.product(b.h_xx, b.x) - b.g_x, unknowns.rows, unknowns.limits
-        ).x
-        step = best - b.x
-        change = qp.product(b.h_xx, step)
-        return b.cost + jnp.sum((2.0 * b.g_x + change) * step), best
+    def moments(u: Array) -> tuple[Array, Array, Array]:
+        a, da_dx, _ = reduced.amplitudes(problem, u, jnp.zeros((c, m), dtype=u.dtype))
+        gram, moment, square = row_sums.linear_moments(problem, u)
+        here = qp.product(gram, a)
+        slope = jnp.einsum("cbm,cb->cm", da_dx, here - moment)
+        gram = jnp.broadcast_to(gram, (c, *gram.shape[1:]))
+        curvature = jnp.einsum("cbm,cbd,cdn->cmn", da_dx, gram, da_dx)
+        return curvature, slope, square + jnp.sum(a * (here - 2.0 * moment))
 
-    return jax.lax.map(one, candidates)
+    curvature, slope, cost = jax.lax.map(moments, candidates)
+    finite = jnp.isfinite(cost)
+    if m:
+        # All at once, which no shape may spoil for the others.
+        finite &= jnp.all(jnp.isfinite(curvature), axis=(1, 2, 3))
+        h = jnp.where(finite[:, None, None, None], curvature, jnp.eye(m))
+        g = jnp.where(finite[:, None, None], slope, 0.0)
+        limits = jnp.tile(unknowns.limits, (cost.shape[0], 1))
+        pull = -g.reshape(-1, m)
+        x = qp.solve(h.reshape(-1, m, m), pull, unknowns.rows, limits).x.reshape(g.shape)
+        cost = cost + jnp.sum((2.0 * g + qp.product(h, x)) * x, axis=(1, 2))
+    else:
+        x = jnp.zeros_like(slope)
+    return jnp.where(finite, jnp.maximum(cost, 0.0), jnp.inf), x

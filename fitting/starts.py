@@ -197,7 +197,7 @@ def thinned(problem: Problem) -> Problem:
     stands_for[_BRIGHT_ROWS:] = np.sqrt((n - _BRIGHT_ROWS) / drawn)
 
     def take(a):
-        return a[..., rows]
+        return np.asarray(a)[..., rows]
 
     return dataclasses.replace(
         problem,

@@ -86,7 +86,7 @@ def _data_blocks(
     # its coefficients to their own best values.
     zero = jnp.zeros_like(problem.energy_weight)
     plain = dataclasses.replace(problem, energy_weight=zero, reciprocity_weight=zero)
-    return reduced.evaluate(plain, u, x, jnp.asarray(False))
+    return reduced.evaluate(plain, u, x)
 
 
 @eqx.filter_jit

@@ -68,7 +68,7 @@ def test_blocks_are_gradient_and_gauss_newton_matrix_of_the_plain_residual(
     with jax.enable_x64(True):
         p = prepared(noisy, objective=objective)
         u, x = jnp.array([0.3]), jnp.tile(jnp.array([0.2, 0.05, 0.7]), (3, 1))
-        b = jax.jit(reduced.evaluate)(p, u, x, jnp.asarray(False))
+        b = jax.jit(reduced.evaluate)(p, u, x)
         residual = plain_residual(p)
         y = jnp.concatenate([u, b.x.ravel()])
         r, jacobian = jax.jit(lambda y: (residual(y), jax.jacfwd(residual)(y)))(y)
@@ -168,9 +168,9 @@ def test_chunks_and_padding_change_nothing(noisy):
         p = prepared(noisy)
         u, x = jnp.array([0.3]), jnp.full((3, 3), 0.3)
         evaluate = jax.jit(reduced.evaluate)
-        whole = evaluate(p, u, x, jnp.asarray(False))
+        whole = evaluate(p, u, x)
         parts = dataclasses.replace(p, chunk=p.kappa.shape[0] // 4)
-        for a, b in zip(whole, evaluate(parts, u, x, jnp.asarray(False)), strict=True):
+        for a, b in zip(whole, evaluate(parts, u, x), strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-15)
         n = select_rows(noisy, 85.0).index.size
         assert p.kappa.shape[0] == problem.bucket(n) > n
