@@ -80,25 +80,25 @@ def load(asked: Asked) -> list[FitResult]:
 
 def run(results: Sequence[FitResult], asked: Asked, flags: Flags) -> Done:
     """Draw and write. Without the measurement the report says what it lacks."""
-    every = [
-        _reported(r, path, asked, first=k == 0)
-        for k, (r, path) in enumerate(zip(results, asked.results, strict=True))
-    ]
-    first = every[0]
     console = stderr()
+    total = len(results) + len(FIRST) + len(MORE)
+    with Work(console, total, quiet=flags.quiet or not console.is_terminal) as work:
+        done = 0
+
+        def at(name: str) -> None:
+            nonlocal done
+            work.at(name, done, 0)
+            done += 1
+
+        every: list[Reported] = []
+        for k, (r, path) in enumerate(zip(results, asked.results, strict=True)):
+            at(f"data of {path.name}")
+            every.append(_reported(r, path, asked, first=k == 0))
+        html = page(every, viewer=asked.viewer, progress=at)
+    first = every[0]
     if first.why and not flags.quiet:
         without = "without measured points: " if first.measurement is None else ""
         console.print(f"{without}{first.why}", soft_wrap=True)
-    total = len(FIRST) + len(MORE)
-    with Work(console, total, quiet=flags.quiet or not console.is_terminal) as work:
-        drawn = 0
-
-        def at(name: str) -> None:
-            nonlocal drawn
-            work.at(name, drawn, 0)
-            drawn += 1
-
-        html = page(every, viewer=asked.viewer, progress=at)
     with replacing(asked.target) as beside:
         beside.write_text(html, encoding="utf-8", newline="\n")
     said = first.verdict
