@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -12,6 +13,9 @@ from fitting.batch.engine import Work, attempt
 from fitting.batch.threads import limit_threads
 
 READY = "ready"
+# JAX makes many objects that stay; looking through them again and again takes a tenth of
+# the time before the first result.
+_RARELY = (100_000, 20, 20)
 
 
 def serve(pipe: Connection, work: Work, threads: int) -> None:
@@ -22,6 +26,7 @@ def serve(pipe: Connection, work: Work, threads: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _end_with_the_parent()
     limit_threads(threads)
+    gc.set_threshold(*_RARELY)
     pipe.send(READY)
     while True:
         try:

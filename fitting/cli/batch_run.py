@@ -60,6 +60,7 @@ def run(
                 receipts[receipt.name] = receipt
                 new += 1
                 progress.ended(receipt)
+                _load_writers()
     except KeyboardInterrupt as error:
         stopped = error
     except ClusterError as error:
@@ -79,6 +80,11 @@ def write_tables(work: FitFile, receipts: Sequence[Receipt]) -> list[Row]:
     files, parameters = tables(work.folder, receipts, RESULT_NAME)
     write_summary(work.folder, files, parameters, beside=work.folder / FOLDER)
     return files
+
+
+def _load_writers() -> None:
+    """Load what the tables need while the workers work and this process would wait."""
+    import fitting.batch.summary_files  # noqa: F401
 
 
 def _receipt(done: Done, plan: Plan, work: FitFile) -> Receipt:
