@@ -189,10 +189,11 @@ def thinned(problem: Problem) -> Problem:
         return problem
     used = np.asarray(problem.weight) > 0
     value = np.max(np.where(used, np.asarray(problem.linear_target), -np.inf), axis=0)
-    order = np.argsort(-value, kind="stable")
+    order = np.argpartition(-value, _BRIGHT_ROWS)
     drawn = _SCAN_ROWS - _BRIGHT_ROWS
-    others = np.random.default_rng(0).permutation(order[_BRIGHT_ROWS:])[:drawn]
-    rows = np.concatenate([order[:_BRIGHT_ROWS], others])
+    rng = np.random.default_rng(0)
+    others = np.sort(rng.choice(n - _BRIGHT_ROWS, drawn, replace=False, shuffle=False))
+    rows = np.concatenate([order[:_BRIGHT_ROWS], order[_BRIGHT_ROWS + others]])
     stands_for = np.ones(_SCAN_ROWS)
     stands_for[_BRIGHT_ROWS:] = np.sqrt((n - _BRIGHT_ROWS) / drawn)
 
