@@ -191,7 +191,7 @@ class Loops:
             self._block.scopes.append({})
         return self._index
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *error: object) -> None:
         for _ in self._shape:
             self._block.scopes.pop()
             self._block.add("}")

@@ -75,9 +75,9 @@ def shader(model: Model) -> Shader:
 
 def _translated(names: tuple[str, ...], traced: ClosedJaxpr, count: int) -> Shader:
     code = Code()
-    inputs: list[Value] = [Scalar(f"p[{k}]", "float", True) for k in range(len(names))]
-    inputs = [
-        Scalar(code.emit(code.prepare, "float", s.name), "float", True) for s in inputs
+    inputs: list[Value] = [
+        Scalar(code.emit(code.prepare, "float", f"p[{k}]"), "float", True)
+        for k in range(len(names))
     ]
     inputs += [Scalar(name, "float", False) for name in _DIRECTIONS]
     outputs = _run(code, traced.jaxpr, traced.consts, inputs)

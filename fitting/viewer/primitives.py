@@ -283,11 +283,13 @@ def _reduce(start: str, step: str) -> Handler:
         axes, block = params["axes"], code.block(operand.known)
         if isinstance(operand, Scalar):
             return operand
+        if kind != "float":
+            raise TranslationError(f"a sum or an extreme of numbers of the type {kind}")
         inner = tuple(operand.shape[a] for a in axes)
 
         def total(outer: Index) -> str:
-            name = code.name("s")
-            block.add(f"{kind} {name} = {start};")
+            name, left = code.name("s"), code.name("c")
+            block.add(f"{kind} {name} = {start}, {left} = 0.0;")
             with Loops(code, block, inner) as index:
                 of_axis = dict(zip(axes, index, strict=True))
                 rest = iter(outer)
@@ -296,7 +298,7 @@ def _reduce(start: str, step: str) -> Handler:
                     for a in range(len(operand.shape))
                 )
                 element = code.at(block, operand, whole)
-                block.add(f"{name} = {step.format(name, element)};")
+                block.add(step.format(name, left, element))
             return name
 
         return _for_each(code, block, shape, kind, operand.known, total)
@@ -315,13 +317,13 @@ def _dot(code, operands, params, shape, kind) -> Value:
     free = [a for a in range(len(left.shape)) if a not in over_left]
 
     def total(outer: Index) -> str:
-        name = code.name("s")
-        block.add(f"{kind} {name} = 0.0;")
+        name, rest = code.name("s"), code.name("c")
+        block.add(f"{kind} {name} = 0.0, {rest} = 0.0;")
         with Loops(code, block, [left.shape[a] for a in over_left]) as index:
             at_left = _placed(len(left.shape), over_left, index, outer[: len(free)])
             at_right = _placed(len(right.shape), over_right, index, outer[len(free) :])
             product = f"{code.at(block, left, at_left)} * {code.at(block, right, at_right)}"
-            block.add(f"{name} += {product};")
+            block.add(f"f_add({name}, {rest}, {product});")
         return name
 
     return _for_each(code, block, shape, kind, known, total)
@@ -355,9 +357,9 @@ STRUCTURE: dict[str, Handler] = {
     "transpose": _transpose,
     "concatenate": _concatenate,
     "iota": _iota,
-    "reduce_sum": _reduce("0.0", "{0} + {1}"),
-    "reduce_max": _reduce("(-3.4e38)", "max({0}, {1})"),
-    "reduce_min": _reduce("3.4e38", "min({0}, {1})"),
-    "reduce_prod": _reduce("1.0", "{0} * {1}"),
+    "reduce_sum": _reduce("0.0", "f_add({0}, {1}, {2});"),
+    "reduce_max": _reduce("(-3.4e38)", "{0} = max({0}, {2});"),
+    "reduce_min": _reduce("3.4e38", "{0} = min({0}, {2});"),
+    "reduce_prod": _reduce("1.0", "{0} *= {2};"),
     "dot_general": _dot,
 }

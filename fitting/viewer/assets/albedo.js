@@ -1,13 +1,17 @@
 // Directional albedo: what of the light from one direction goes to one side, all in all.
 
-import { aroundCentre, dot, fromAngles, gauss, graded, gradedSlope, Pairs, smoothExit } from "./directions.js";
+import {
+  aroundCentre, dot, fromAngles, gauss, graded, gradedSlope, Pairs, smoothExit, turned, turnedSlope,
+} from "./directions.js";
 import { radians, short } from "./numbers.js";
 import { DASHES, lineColour } from "./palette.js";
 import { axes, curve } from "./plot.js";
 
 const THETAS = [0, 10, 20, 30, 40, 50, 57, 64, 70, 75, 80, 84, 87];
 const SHARES = 24;
-const AZIMUTHS = 24;
+// In each half of the turn.
+const AZIMUTHS = 14;
+const GROWTH = 7;
 
 export class Albedo {
   constructor(fit, glsl, canvas, caption) {
@@ -39,7 +43,7 @@ export class Albedo {
 
   compute(view, channels, solo) {
     const { fit } = this;
-    const pairs = new Pairs(THETAS.length * 2 * SHARES * AZIMUTHS);
+    const pairs = new Pairs(THETAS.length * 4 * SHARES * AZIMUTHS);
     const weights = [];
     for (const theta of THETAS) {
       const from = view.back ? Math.PI - radians(theta) : radians(theta);
@@ -60,19 +64,19 @@ export class Albedo {
 // Nodes that close up on the mirror direction (or the way through) and, of reflected light,
 // on the way back; each half counts what is nearer to its own centre, smoothly shared.
 function quadrature(wi, through, index, pairs, weights) {
-  const { nodes, weights: along } = gauss(SHARES);
-  const azimuths = Array.from({ length: AZIMUTHS }, (_, j) => (2 * Math.PI * (j + 0.5)) / AZIMUTHS);
-  const exit = smoothExit(wi, through, index);
-  const centres = [exit, through ? [-wi[0], -wi[1], -wi[2]] : wi];
-  const shares = nodes.map(graded);
+  const across = gauss(SHARES), around = gauss(AZIMUTHS);
+  const shares = across.nodes.map((u) => graded(u, GROWTH));
+  const along = across.nodes.map((u, k) => gradedSlope(u, GROWTH) * across.weights[k]);
+  const turns = around.nodes.map((u, j) => turnedSlope(u) * around.weights[j]);
+  const straight = [-wi[0], -wi[1], -wi[2]];
+  const centres = [smoothExit(wi, through, index), through ? straight : wi];
   centres.forEach((centre, which) => {
     const other = centres[1 - which];
-    aroundCentre(centre, shares, azimuths, (wo, k, j, rho, longest) => {
+    aroundCentre(centre, shares, turned(around.nodes), (wo, k, j, area) => {
       const own = 1 - dot(wo, centre) + 1e-12, theirs = 1 - dot(wo, other) + 1e-12;
       const part = theirs / (own + theirs);
-      const area = Math.sin(rho) * longest * gradedSlope(nodes[k]) * along[k] * ((2 * Math.PI) / AZIMUTHS);
       pairs.add(wi, wo);
-      weights.push(area * part * Math.abs(wo[2]));
+      weights.push(area * along[k] * turns[j % AZIMUTHS] * part * Math.abs(wo[2]));
     });
   });
 }

@@ -8,14 +8,6 @@ export function fromAngles(theta, phi) {
 }
 
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-export const cross = (a, b) => [
-  a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0],
-];
-
-export function unit(a) {
-  const size = Math.hypot(...a);
-  return a.map((x) => x / size);
-}
 
 // Pairs of directions with four floats each, as textures want them.
 export class Pairs {
@@ -43,32 +35,40 @@ export function smoothExit(wi, through, index) {
   return [x, y, -Math.sign(wi[2] || 1) * Math.sqrt(1 - sine2)];
 }
 
-// A hemisphere in rings around a centre in it, each ring a share of the way to the horizon:
-// `visit(direction, k, j, rho, longest)` for every share k and azimuth j.
+// A hemisphere by half vectors: rings of them around the normal, each a share of the way
+// that leads to the horizon, mirror a source into rings around a centre. Lobes of facets are
+// round there, at grazing incidence as well. `visit(wo, k, j, area)` is called for every
+// share k and azimuth j with the solid angle per unit of share and azimuth.
 export function aroundCentre(centre, shares, azimuths, visit) {
-  const side = centre[2] >= 0 ? 1 : -1;
-  const upright = Math.hypot(centre[0], centre[1]) < 1e-12;
-  const a = upright ? [1, 0, 0] : unit(cross([0, 0, 1], centre));
-  const b = cross(centre, a);
+  const side = centre[2] < 0 ? -1 : 1;
+  const [x, y, z] = [-centre[0], -centre[1], Math.abs(centre[2])];
+  const sine = Math.hypot(x, y), first = Math.atan2(y, x);
   for (let j = 0; j < azimuths.length; ++j) {
-    const c = Math.cos(azimuths[j]), s = Math.sin(azimuths[j]);
-    const t = [0, 1, 2].map((k) => c * a[k] + s * b[k]);
-    const longest = Math.atan2(Math.abs(centre[2]), -side * t[2]);
+    // Where the mirrored direction is horizontal: tan(2 theta_h - pi / 2) tells.
+    const longest = 0.5 * (Math.PI / 2 + Math.atan2(sine * Math.cos(azimuths[j]), z));
+    const [c, s] = [Math.cos(first + azimuths[j]), Math.sin(first + azimuths[j])];
     for (let k = 0; k < shares.length; ++k) {
-      const rho = shares[k] * longest;
-      const cr = Math.cos(rho), sr = Math.sin(rho);
-      const wo = [0, 1, 2].map((q) => cr * centre[q] + sr * t[q]);
+      const theta = shares[k] * longest;
+      const h = [Math.sin(theta) * c, Math.sin(theta) * s, Math.cos(theta)];
+      const along = dot([x, y, z], h);
+      const wo = [2 * along * h[0] - x, 2 * along * h[1] - y, side * (2 * along * h[2] - z)];
       // Rounding shall not send the last ring below the horizon.
       if (side * wo[2] < 0) wo[2] = 0;
-      visit(wo, k, j, rho, longest);
+      visit(wo, k, j, 4 * along * Math.sin(theta) * longest);
     }
   }
 }
 
+// Azimuths in both halves of a turn that close up where the way to the horizon changes:
+// those of numbers in [0, 1), and their derivative.
+export const turned = (us) => [-1, 1].flatMap(
+  (side) => us.map((u) => side * (Math.PI / 2) + Math.PI * u * u * (3 - 2 * u)),
+);
+export const turnedSlope = (u) => 6 * Math.PI * u * (1 - u);
+
 // Shares of a way that grow exponentially from its beginning, and their derivative.
-const GROWTH = 7;
-export const graded = (u) => Math.expm1(GROWTH * u) / Math.expm1(GROWTH);
-export const gradedSlope = (u) => (GROWTH * Math.exp(GROWTH * u)) / Math.expm1(GROWTH);
+export const graded = (u, growth) => Math.expm1(growth * u) / Math.expm1(growth);
+export const gradedSlope = (u, growth) => (growth * Math.exp(growth * u)) / Math.expm1(growth);
 
 // Gauss-Legendre nodes and weights on [0, 1].
 export function gauss(count) {

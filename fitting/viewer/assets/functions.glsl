@@ -5,6 +5,14 @@
 const float LN2_HIGH = 0.693359375;
 const float LN2_LOW = -2.12194440e-4;
 
+// Add a term to a sum whose rounding errors are kept (Kahan 1965).
+void f_add(inout float sum, inout float rest, float term) {
+  float corrected = term - rest;
+  float next = sum + corrected;
+  rest = (next - sum) - corrected;
+  sum = next;
+}
+
 // x 2^n, in two steps: 2^n alone may be beyond the floats.
 float f_ldexp(float x, int n) {
   int half_n = n / 2;

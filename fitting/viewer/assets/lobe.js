@@ -1,6 +1,6 @@
 // The lobe: how much goes where for light from one direction, as a surface to turn around.
 
-import { aroundCentre, fromAngles, graded, Pairs, range, smoothExit } from "./directions.js";
+import { aroundCentre, fromAngles, graded, Pairs, range, smoothExit, turned } from "./directions.js";
 import { beginPicture, buildProgram, floatTexture, useProgram } from "./gl.js";
 import { radians, short } from "./numbers.js";
 import { decadesOf, themed, viridis } from "./palette.js";
@@ -8,6 +8,7 @@ import { line, surface } from "./plot.js";
 
 const RINGS = 97;
 const AZIMUTHS = 144;
+const GROWTH = 4.5;
 const SCALE = 0.9;
 // How far from the shown direction of incidence measured ones may be.
 const NEAR_DEG = 1.0;
@@ -60,8 +61,8 @@ export class Lobe {
   evaluate(wi, solo) {
     const { fit } = this;
     const pairs = new Pairs(this.through.length * RINGS * AZIMUTHS);
-    const shares = range(RINGS, 0, 1).map(graded);
-    const azimuths = range(AZIMUTHS + 1, 0, 2 * Math.PI).slice(0, AZIMUTHS);
+    const shares = range(RINGS, 0, 1).map((u) => graded(u, GROWTH));
+    const azimuths = turned(range(AZIMUTHS / 2 + 1, 0, 1).slice(0, -1));
     for (const through of this.through) {
       const centre = smoothExit(wi, through, fit.index);
       aroundCentre(centre, shares, azimuths, (wo) => pairs.add(wi, wo));

@@ -10,5 +10,5 @@ uniform int rows;
 int known_row;
 
 float known(int k) {
-  return texelFetch(known_values, ivec2(k, known_row), 0).r;
+  return texelFetch(known_values, ivec2(k >> 2, known_row), 0)[k & 3];
 }

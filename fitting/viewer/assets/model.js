@@ -21,7 +21,8 @@ ${shader.constants}
     this.beginning = `${own}${glsl.model}${shader.evaluate}\n${glsl.value}`;
     this.preparing = buildProgram(gl, glsl.screen, own + shader.prepare + glsl.prepare);
     this.points = buildProgram(gl, glsl.screen, this.beginning + glsl.points);
-    this.known = floatTexture(gl, known, channels, 1, null);
+    this.width = Math.ceil(known / 4);
+    this.known = floatTexture(gl, this.width, channels, 4, null);
     this.textures = {};
   }
 
@@ -29,24 +30,23 @@ ${shader.constants}
   setParameters(values) {
     const { gl, channels } = this;
     const { parameters, known, basis } = this.shader;
-    const width = Math.max(parameters.length, 1);
     this.textures.parameters = floatTexture(
-      gl, width, channels, 1, values.length ? values : new Float32Array(channels),
+      gl, Math.max(parameters.length, 1), channels, 1, values.length ? values : new Float32Array(channels),
       this.textures.parameters,
     );
     const all = runToTexture(
-      gl, this.preparing, { parameters: this.textures.parameters }, this.known, known, channels,
+      gl, this.preparing, { parameters: this.textures.parameters }, this.known, this.width, channels,
     );
+    const number = (c, k) => all[4 * this.width * c + k];
     this.factors = [];
     for (let c = 0; c < channels; ++c) {
-      const first = c * known + known - basis;
-      this.factors.push(Array.from({ length: basis }, (_, j) => all[4 * (first + j)]));
+      this.factors.push(Array.from({ length: basis }, (_, j) => number(c, known - basis + j)));
     }
     // Whether one set of shape parameters serves all channels.
     this.shared = true;
     for (let k = 0; k < known - basis; ++k) {
       for (let c = 1; c < channels; ++c) {
-        if (!Object.is(all[4 * (c * known + k)], all[4 * k])) this.shared = false;
+        if (!Object.is(number(c, k), number(0, k))) this.shared = false;
       }
     }
   }

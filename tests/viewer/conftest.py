@@ -1,0 +1,81 @@
+"""What the tests of the viewer look at: fits of the bundled sample, and a browser."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from opened_pages import Open, Opened
+
+from data_formats import Measurement, read
+from fitting import fit
+from fitting.result import FitResult
+from fitting.sample import sample_path
+
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "chrome")
+ARGUMENTS = (
+    "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--no-first-run",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def paint() -> Measurement:
+    return read(sample_path())
+
+
+@pytest.fixture(scope="session")
+def glossy(paint: Measurement) -> FitResult:
+    return fit(paint, "lambert + ggx", starts=2)
+
+
+@pytest.fixture(scope="session")
+def matt(paint: Measurement) -> FitResult:
+    return fit(paint, "oren_nayar", starts=1)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """A headless Chromium: of ``BRDF_CHROMIUM``, or the first that is found."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    found = os.environ.get("BRDF_CHROMIUM") or next(
+        filter(None, map(shutil.which, CHROMIUM)), None
+    )
+    if found is None:
+        pytest.skip(f"needs Chromium: BRDF_CHROMIUM, or one of {', '.join(CHROMIUM)}")
+    with playwright.sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=found, args=list(ARGUMENTS))
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="module")
+def opened(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Open]:
+    """Opens HTML from a file, as a user does; any other request is refused and noted."""
+    contexts = []
+
+    def show(html: str, **options: Any) -> Opened:
+        file = tmp_path_factory.mktemp("page") / "page.html"
+        file.write_text(html, "utf-8")
+        context = browser.new_context(**options)
+        contexts.append(context)
+        out = Opened(context.new_page())
+
+        def route(request: Any) -> None:
+            out.asked.append(request.request.url)
+            own = request.request.url == file.as_uri()
+            request.continue_() if own else request.abort()
+
+        out.page.route("**/*", route)
+        out.page.on("console", lambda message: out.said.append(message.text))
+        out.page.on("pageerror", lambda error: out.said.append(str(error)))
+        out.page.goto(file.as_uri())
+        return out
+
+    yield show
+    for context in contexts:
+        context.close()
