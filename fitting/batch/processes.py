@@ -64,17 +64,21 @@ class Processes:
                         stillborn += not lane.ready
                         if stillborn >= _NEVER_READY:
                             raise RuntimeError("worker processes end before they begin")
+                    done = None
                     if answer is not None and key is not None:
                         if answer.outcome == "again" and tries[key] <= retries:
                             waiting.append(key)
                         else:
-                            yield _done(key, answer, tries[key])
+                            done = _done(key, answer, tries[key])
                     if waiting and not alive:
                         lanes.append(self._begin(work))
                     elif waiting:
                         lane.key = waiting.popleft()
                         tries[lane.key] += 1
                         _send(lane, items[lane.key])
+                    # Last, so that nobody is idle while the receiver is busy.
+                    if done is not None:
+                        yield done
         finally:
             for lane in lanes:
                 lane.process.kill()

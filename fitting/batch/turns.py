@@ -32,14 +32,17 @@ def first_of(what: str, cache: Path | None) -> Iterator[None]:
         return
     try:
         if done.exists():
-            os.close(handle)
-            handle = -1
+            _let_others(handle)
         yield
-        if handle >= 0:
-            done.touch()
+        done.touch()
     finally:
-        if handle >= 0:
-            os.close(handle)
+        os.close(handle)
+
+
+def _let_others(handle: int) -> None:
+    import fcntl
+
+    fcntl.flock(handle, fcntl.LOCK_UN)
 
 
 def _locked(path: Path) -> int:

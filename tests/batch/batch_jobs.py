@@ -8,6 +8,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from fitting.batch.turns import first_of
 from fitting.batch.writing import replace_file
 
 
@@ -70,3 +71,21 @@ class Unloadable:
 
     def __call__(self, number: int) -> int:
         raise AssertionError(number)
+
+
+@dataclass(frozen=True)
+class Compile:
+    """Something that one process is to do first; writes down when it was at it."""
+
+    folder: Path
+    kills_once: bool = False
+
+    def __call__(self, number: int) -> tuple[float, float]:
+        with first_of("the same", self.folder):
+            begin = time.monotonic()
+            killed = self.folder / "killed"
+            if self.kills_once and not killed.exists():
+                killed.touch()
+                os.kill(os.getpid(), signal.SIGKILL)
+            time.sleep(0.2)
+            return begin, time.monotonic()
