@@ -236,7 +236,7 @@ def _operations(jaxpr: jex.Jaxpr, n_rows: int) -> Iterator[str]:
     """Names of the operations on arrays as long as the rows; one on more counts as more."""
     for equation in jaxpr.eqns:
         inner = [
-            getattr(p, "jaxpr", p)
+            p.jaxpr if isinstance(p, jex.ClosedJaxpr) else p
             for p in equation.params.values()
             if isinstance(p, jex.ClosedJaxpr | jex.Jaxpr)
         ]
@@ -246,7 +246,7 @@ def _operations(jaxpr: jex.Jaxpr, n_rows: int) -> Iterator[str]:
                 yield from _operations(one, n_rows)
             continue
         variables = (*equation.invars, *equation.outvars)
-        size = max((math.prod(v.aval.shape) for v in variables), default=0)
+        size = max((getattr(v.aval, "size", 1) for v in variables), default=0)
         for _ in range(size // n_rows):
             yield name
 

@@ -7,9 +7,8 @@ deal with the few shared shape unknowns only.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import equinox as eqx
 import equinox.internal as eqxi
@@ -27,7 +26,15 @@ _FIRST_DAMPING = 1e-3
 _NOTICEABLE = 1e-10
 _MAX_IDLE = 8
 
-_compiled = functools.partial(eqx.filter_jit, compiler_options=row_sums.FAST)
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+def _compiled(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    return eqx.filter_jit(  # pyright: ignore[reportCallIssue]
+        function, compiler_options=row_sums.FAST
+    )
 
 
 class Solution(NamedTuple):
