@@ -23,7 +23,8 @@ def packed(measurement: Measurement, ways: tuple[Way, ...]) -> dict[str, Any]:
     """Angles ``(n, 4)`` in radians and values ``(n, c)``, NaN where not valid, as float32.
 
     Rows in the plane of incidence come first; of the others as many as there is room for,
-    evenly spread over the file. ``incidences`` are the polar angles of the source, degrees.
+    evenly spread over the file. ``incidences`` are the polar angles of the source, and
+    ``azimuth`` is the one that most rows have, in degrees.
     """
     m = measurement
     seen = np.flatnonzero(m.valid.any(axis=1) & np.isin(ways_of(m), ways))
@@ -40,6 +41,7 @@ def packed(measurement: Measurement, ways: tuple[Way, ...]) -> dict[str, Any]:
         "angles": _base64(angles),
         "values": _base64(values),
         "incidences": _incidences(m.theta_i[seen]),
+        "azimuth": _most_common(m.phi_i[seen]),
     }
 
 
@@ -59,6 +61,13 @@ def _incidences(theta_i: np.ndarray) -> list[float]:
     label = incidence_labels(theta_i)
     means = [float(np.degrees(theta_i[label == k].mean())) for k in np.unique(label)]
     return sorted(round(m, 3) for m in means)
+
+
+def _most_common(phi: np.ndarray) -> float:
+    """In (-180, 180]."""
+    turned = 180.0 - np.mod(180.0 - np.degrees(phi), 360.0)
+    values, counts = np.unique(turned.round(1), return_counts=True)
+    return float(values[np.argmax(counts)]) if values.size else 0.0
 
 
 def _base64(numbers: np.ndarray) -> str:

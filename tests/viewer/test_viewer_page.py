@@ -126,7 +126,7 @@ def test_albedo_is_that_of_the_fit(shown: Opened, glossy: FitResult) -> None:
                    if p.coefficient]  # fmt: skip
         factors = lobe.amplitudes(own, tuple(o[channel] for o in ordered))
         exact += sum(np.asarray(b) * a for b, a in zip(basis, factors, strict=True))
-    np.testing.assert_allclose(got["curves"][0], exact, rtol=5e-3)
+    np.testing.assert_allclose(got["curves"][0], exact, rtol=1e-3)
 
 
 def test_slider_changes_pictures_and_texts_and_reset_restores(

@@ -1,7 +1,7 @@
 // Directional albedo: what of the light from one direction goes to one side, all in all.
 
 import {
-  aroundCentre, dot, fromAngles, gauss, graded, gradedSlope, Pairs, smoothExit, turned, turnedSlope,
+  aroundCentre, dot, fromAngles, gauss, graded, gradedSlope, Pairs, smoothExit, turned,
 } from "./directions.js";
 import { radians, short } from "./numbers.js";
 import { DASHES, lineColour } from "./palette.js";
@@ -10,7 +10,7 @@ import { axes, curve } from "./plot.js";
 const THETAS = [0, 10, 20, 30, 40, 50, 57, 64, 70, 75, 80, 84, 87];
 const SHARES = 24;
 // In each half of the turn.
-const AZIMUTHS = 14;
+const AZIMUTHS = 16;
 const GROWTH = 7;
 
 export class Albedo {
@@ -62,18 +62,20 @@ export class Albedo {
 }
 
 // Nodes that close up on the mirror direction (or the way through) and, of reflected light,
-// on the way back; each half counts what is nearer to its own centre, smoothly shared.
+// on the way back. Each grid counts what is nearer to its own centre, so smoothly shared that
+// little of the peak at the other one, where its nodes are far apart, is left.
 function quadrature(wi, through, index, pairs, weights) {
   const across = gauss(SHARES), around = gauss(AZIMUTHS);
   const shares = across.nodes.map((u) => graded(u, GROWTH));
   const along = across.nodes.map((u, k) => gradedSlope(u, GROWTH) * across.weights[k]);
-  const turns = around.nodes.map((u, j) => turnedSlope(u) * around.weights[j]);
+  const turns = around.weights.map((w) => Math.PI * w);
   const straight = [-wi[0], -wi[1], -wi[2]];
   const centres = [smoothExit(wi, through, index), through ? straight : wi];
   centres.forEach((centre, which) => {
     const other = centres[1 - which];
     aroundCentre(centre, shares, turned(around.nodes), (wo, k, j, area) => {
-      const own = 1 - dot(wo, centre) + 1e-12, theirs = 1 - dot(wo, other) + 1e-12;
+      const own = (1 - dot(wo, centre) + 1e-9) ** 2;
+      const theirs = (1 - dot(wo, other) + 1e-9) ** 2;
       const part = theirs / (own + theirs);
       pairs.add(wi, wo);
       weights.push(area * along[k] * turns[j % AZIMUTHS] * part * Math.abs(wo[2]));

@@ -13,7 +13,7 @@ export class Controls {
     this.slider("incidence", "Incidence", { min: 0, max: 89, step: 0.1 }, "theta", "°");
     if (measured.length) this.jump(measured.filter((t) => t <= 90).sort((a, b) => a - b));
     if (fits.some((f) => f.anisotropic)) {
-      this.slider("azimuth", "Azimuth of the source", { min: -180, max: 180, step: 1 }, "phi", "°");
+      this.slider("azimuth", "Azimuth of the source", { min: -180, max: 180, step: 0.1 }, "phi", "°");
     }
     const ways = new Set(fits.flatMap((f) => f.ways));
     if (ways.has("back") || ways.has("up")) this.tick("back", "Lit from the back", "back");

@@ -59,12 +59,11 @@ export function aroundCentre(centre, shares, azimuths, visit) {
   }
 }
 
-// Azimuths in both halves of a turn that close up where the way to the horizon changes:
-// those of numbers in [0, 1), and their derivative.
-export const turned = (us) => [-1, 1].flatMap(
-  (side) => us.map((u) => side * (Math.PI / 2) + Math.PI * u * u * (3 - 2 * u)),
+// Azimuths of a turn from shares of its halves, which meet where the way to the horizon
+// changes at grazing incidence.
+export const turned = (shares) => [-1, 1].flatMap(
+  (side) => shares.map((u) => side * (Math.PI / 2) + Math.PI * u),
 );
-export const turnedSlope = (u) => 6 * Math.PI * u * (1 - u);
 
 // Shares of a way that grow exponentially from its beginning, and their derivative.
 export const graded = (u, growth) => Math.expm1(growth * u) / Math.expm1(growth);

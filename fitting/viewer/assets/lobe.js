@@ -62,7 +62,7 @@ export class Lobe {
     const { fit } = this;
     const pairs = new Pairs(this.through.length * RINGS * AZIMUTHS);
     const shares = range(RINGS, 0, 1).map((u) => graded(u, GROWTH));
-    const azimuths = turned(range(AZIMUTHS / 2 + 1, 0, 1).slice(0, -1));
+    const azimuths = turned(range(AZIMUTHS / 2 + 1, 0, 1).slice(0, -1).map((u) => u * u * (3 - 2 * u)));
     for (const through of this.through) {
       const centre = smoothExit(wi, through, fit.index);
       aroundCentre(centre, shares, azimuths, (wo) => pairs.add(wi, wo));

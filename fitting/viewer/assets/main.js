@@ -20,6 +20,7 @@ class Page {
   constructor(root, { fits, glsl }) {
     this.live = root.querySelector(".viewer-live");
     const gl = openGraphics();
+    gl.canvas.addEventListener("webglcontextlost", () => fail(root, "the graphics hardware gave up; load the page again"));
     this.fits = fits.map((given, number) => new Fit(gl, { ...given, number }, glsl));
     this.view = new View(this.fits);
     this.stale = new Map();
@@ -100,11 +101,15 @@ function start(root) {
     // Kept where someone with a console finds it.
     root.page = new Page(root, data);
   } catch (error) {
-    const failed = root.querySelector(".viewer-failed");
-    failed.textContent = `The viewer cannot start: ${error.message}.`;
-    failed.hidden = false;
-    root.querySelector(".viewer-controls").hidden = true;
+    fail(root, error.message);
   }
+}
+
+function fail(root, why) {
+  const failed = root.querySelector(".viewer-failed");
+  failed.textContent = `The viewer does not work: ${why}.`;
+  failed.hidden = false;
+  root.querySelector(".viewer-controls").hidden = true;
 }
 
 for (const root of document.querySelectorAll("section.viewer")) start(root);

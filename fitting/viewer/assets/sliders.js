@@ -84,7 +84,8 @@ export class Sliders {
         const factor = this.fit.factors.get(p.name) ?? 1;
         input.value = String(Math.round((STEPS * (Math.log(factor) / Math.log(FACTOR) + 1)) / 2));
         const [low, high] = [Math.min(...all), Math.max(...all)];
-        now.textContent = `× ${short(factor, 3)}: ${short(low, 3)} … ${short(high, 3)}`;
+        const span = low === high ? short(low, 3) : `${short(low, 3)} … ${short(high, 3)}`;
+        now.textContent = `× ${short(factor, 3)}: ${span}`;
       } else {
         const value = all[all.length > 1 ? this.solo : 0];
         input.value = String(Math.round(STEPS * shareOf(p, value)));

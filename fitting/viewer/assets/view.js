@@ -8,12 +8,13 @@ const SAME_AZIMUTH = radians(2);
 export class View {
   constructor(fits) {
     this.first = nearest(fits.flatMap((f) => f.data?.incidences ?? []), 30);
+    this.firstPhi = fits.find((f) => f.anisotropic && f.data)?.data.azimuth ?? 0;
     this.reset();
   }
 
   reset() {
     Object.assign(this, {
-      theta: this.first, phi: 0, back: false, through: false, exposure: 0, logarithmic: true,
+      theta: this.first, phi: this.firstPhi, back: false, through: false, exposure: 0, logarithmic: true,
       channel: null, lightTurn: radians(-50), lightHeight: radians(35),
       cameraTurn: radians(-62), cameraHeight: radians(22),
     });
