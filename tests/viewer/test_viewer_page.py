@@ -241,6 +241,22 @@ def test_shapes_of_their_own_in_every_channel(
     assert out.said == []
 
 
+def test_tied_parameters_follow(
+    opened: Open, glossy: FitResult, paint: Measurement
+) -> None:
+    parameters = [
+        msgspec.structs.replace(p, tied_to="ggx.f0") if p.name == "ggx.f90" else p
+        for p in glossy.parameters
+    ]
+    out = opened(page([msgspec.structs.replace(glossy, parameters=parameters)], [paint]))
+    assert out.page.locator("#viewer-0-ggx-f90").is_disabled()
+    assert "tied to ggx.f0" in out.page.locator("#viewer-0-ggx-f90-about").inner_text()
+    out.run(SET, ["#viewer-0-ggx-f0", "600"])
+    for name in ("ggx.f0", "ggx.f90"):
+        now = np.array(out.run(f"() => {PAGE}.fits[0].values.get('{name}')"))
+        np.testing.assert_allclose(now / glossy.parameter(name).value, 8**0.2, rtol=1e-12)
+
+
 def test_without_webgl_the_page_says_so(opened: Open, html: str) -> None:
     without = html.replace('getContext("webgl2"', 'getContext("no-such-thing"')
     script = without[without.rindex('<script type="module">') :]

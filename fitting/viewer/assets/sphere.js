@@ -7,7 +7,8 @@ export class Sphere {
   constructor(fit, glsl, canvas, caption) {
     this.fit = fit;
     this.canvas = canvas;
-    caption.textContent = "drag the light, or use the arrow keys";
+    const grey = fit.coloured || fit.count === 1 ? "" : "; these channels make no colour";
+    caption.textContent = `drag the light, or use the arrow keys${grey}`;
     this.program = buildProgram(
       fit.shader.gl, glsl.screen, fit.shader.beginning + glsl.sphere,
     );
