@@ -16,6 +16,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from msgspec.structs import replace
+from numpy.typing import ArrayLike
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
@@ -46,7 +47,7 @@ class Material(NamedTuple):
 
     name: str
     truth: str
-    parameters: Mapping[str, object]
+    parameters: Mapping[str, ArrayLike]
     model: str
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import sys
 from pathlib import Path
@@ -18,9 +19,7 @@ SAME = 0.015
 @pytest.fixture
 def script(monkeypatch):
     monkeypatch.setattr(sys, "path", [str(FOLDER), *sys.path])
-    import readme_spheres
-
-    return readme_spheres
+    return importlib.import_module("readme_spheres")
 
 
 def means(text: str) -> dict[str, float]:

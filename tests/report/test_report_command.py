@@ -7,6 +7,7 @@ import io
 import json
 import re
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -115,6 +116,21 @@ def test_usage_errors(run, tmp_path, data):
     )  # fmt: skip
     data_formats.write(one, tmp_path / "mono.csv")
     refuses(run, "paint.fit.json", "--data", "mono.csv", says="has 1 channel .mono.")
+
+
+def test_without_jinja2(run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    refuses(run, "paint.fit.json", says="reports need jinja2.*brdf-fitting.report")
+
+
+def test_without_matplotlib(run, monkeypatch):
+    """There is a report all the same, which says what would draw its figures."""
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    code, _, _ = run("paint.fit.json", "--no-viewer")
+    assert code == 0
+    tree = parse(Path("paint.report.html").read_text("utf-8"))
+    assert "There are no figures: figures need matplotlib" in tree.by_id("figures").text
+    assert not list(tree.all("img"))
 
 
 def test_a_failure_leaves_the_old_report(run, monkeypatch):
