@@ -45,7 +45,7 @@ def _residuals(result: FitResult) -> str:
         f"of {number(worst.objective, 3)} ({result.settings.objective})"
     )
     shares = [(c.relative_rms, c.channel) for c in result.by_channel if c.relative_rms]
-    if shares:
+    if len(result.channels) > 1 and shares:
         share, channel = max(shares)
         text += f"; by channel at {channel}, with {percent(share)} of the data's RMS"
     return text
