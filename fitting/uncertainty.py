@@ -72,7 +72,7 @@ def covariance(problem: Problem, end: Solution) -> Covariance:
         np.asarray(v) for v in _moments(problem, u, x, jnp.asarray(bread), noise)
     )
     with np.errstate(divide="ignore", invalid="ignore"):
-        freedom = np.where(second > 0, np.maximum(first**2 / second, 1.0), np.inf)
+        freedom = np.where(second > 0, np.maximum(first * (first / second), 1.0), np.inf)
     whole = float(end.cost)
     penalty = max(1.0 - float(b.cost) / whole, 0.0) if whole > 0 else 0.0
     return Covariance(matrix, freedom, active, penalty)
