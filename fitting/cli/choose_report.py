@@ -105,7 +105,7 @@ def _legend(found: Choice) -> tuple[str, ...]:
     )
     return (
         "cost: counted operations of an evaluation, relative to the model that is kept (*)",
-        f"{error}, without the noise of the data",
+        f"{error}; without the data's noise, with what is unknown between the samples",
         "change: the same difference from the model that is kept"
         + ("" if found.measure == ALBEDO else ", in the mean"),
     )

@@ -14,7 +14,7 @@ import numpy as np
 from fitting.geometry import Geometry, from_components
 
 # Round lobes are interpolated better with less, those of Phong's kind with more.
-_SQUEEZE = 1.0 / 3.0
+SQUEEZED = 1.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -77,13 +77,14 @@ class Chart:
     step_h: float
     step_d: float
     isotropic: bool
+    squeeze: float = SQUEEZED
 
     def points(self, a: HalfAngles) -> np.ndarray:
         """``(n, 3)`` or ``(n, 4)``."""
         r, s = a.theta_h / self.step_h, a.theta_d / self.step_d
         if self.isotropic:
             folded = np.arctan2(np.abs(np.sin(a.phi_d)), np.abs(np.cos(a.phi_d)))
-            turn = _SQUEEZE * folded
+            turn = self.squeeze * folded
             return np.stack([r * np.cos(turn), r * np.sin(turn), s], axis=-1)
         # The light's azimuth in the surface; twice, as exchanging adds half a turn.
         turn = 2.0 * (a.phi_d + a.phi_h)

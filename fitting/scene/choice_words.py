@@ -158,8 +158,18 @@ def unsupported(stage: Stage, kept: Candidate) -> list[str]:
         if noise > 0
         else "no noise of the data was found to take off the errors"
     )
+    between = kept.error.interpolation
+    if between > 0:
+        out.append(
+            f"another interpolation of the data differs by {amount(stage, between)} (mean), "
+            "which is added to the errors, in quadrature"
+        )
+    if between > stage.measure.limits[0]:
+        out.append(
+            "that is more than the tolerance: the samples are too far apart for this scene"
+        )
     if noise > stage.measure.limits[0]:
-        out.append("that is more than the tolerance: repeat the measurement to tell more")
+        out.append("the noise is more than the tolerance: repeat the measurement")
     through = int(np.sum(stage.measurement.transmitted))
     if through:
         out.append(

@@ -11,7 +11,7 @@ best. Reciprocity is used: exchanged directions are one point.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import RBFInterpolator, RegularGridInterpolator
@@ -51,6 +51,7 @@ class Reference:
     floor: np.ndarray
     _table: RegularGridInterpolator
     _noise_table: RegularGridInterpolator
+    _other_table: RegularGridInterpolator | None
     _scale: np.ndarray
     _tree: KDTree
     _far: float
@@ -62,6 +63,13 @@ class Reference:
         at = _coordinates(half_angles(g), isotropic=self.chart.isotropic)
         v = self._table(at) + self._noise_table(at) if noisy else self._table(at)
         return self._scale * np.sinh(v)
+
+    def otherwise(self, g: Geometry) -> np.ndarray:
+        """`value` by a second interpolation, as plausible and a little worse: how far the
+        two are apart is about how far the first is from the truth. Of anisotropic surfaces
+        there is none, and it is the first."""
+        at = _coordinates(half_angles(g), isotropic=self.chart.isotropic)
+        return self._scale * np.sinh((self._other_table or self._table)(at))
 
     def supported(self, g: Geometry) -> np.ndarray:
         """``(n,)`` True where samples are near; elsewhere `value` is extrapolated."""
@@ -125,13 +133,14 @@ def interpolate(rows: Rows, *, isotropic: bool, seed: int = 0) -> Reference:
         RegularGridInterpolator(axes, t, method="linear")
         for t in np.split(table, 2, axis=-1)
     )
+    other = _round_table(chart, angles, columns, neighbours, _SMOOTHINGS[best])
     tree = KDTree(points)
     distance = tree.query(points, k=2)[0][:, 1]
     # Towards grazing values change fast, and nothing is known beyond the steepest rows.
     steepest = _steepness(rows.geometry).max(axis=1, keepdims=True)
     return Reference(
         chart=chart, smoothing=_SMOOTHINGS[best], relative_noise=relative, floor=floor,
-        _table=values, _noise_table=of_noise, _scale=scale, _tree=tree,
+        _table=values, _noise_table=of_noise, _other_table=other, _scale=scale, _tree=tree,
         _far=_FAR * max(1.0, float(np.percentile(distance, 95))), _steepest=steepest,
     )  # fmt: skip
 
@@ -252,6 +261,22 @@ def _coordinates(a: HalfAngles, *, isotropic: bool) -> np.ndarray:
         return np.stack([t, theta_d, folded], axis=-1)
     light = np.mod(a.phi_d + a.phi_h, np.pi)
     return np.stack([t, a.phi_h, theta_d, light], axis=-1)
+
+
+def _round_table(
+    chart: Chart,
+    angles: HalfAngles,
+    columns: np.ndarray,
+    neighbours: int,
+    smoothing: float,
+) -> RegularGridInterpolator | None:
+    """The interpolation in the chart whose azimuths are not squeezed."""
+    if not chart.isotropic:
+        return None
+    other = replace(chart, squeeze=1.0)
+    rbf = _Local(other.points(angles), columns, neighbours, smoothing)
+    axes, table = _tabulated(rbf, other)
+    return RegularGridInterpolator(axes, table, method="linear")
 
 
 def _tabulated(rbf: _Local, chart: Chart) -> tuple[list[np.ndarray], np.ndarray]:

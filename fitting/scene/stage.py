@@ -40,11 +40,13 @@ class ImageError(msgspec.Struct, frozen=True):
     """How far a model is from the data in a scene, in the measure of its tolerance.
 
     ``mean`` and ``percentile_95`` over the picture (both the largest one, of an albedo),
-    with half of what the data's noise adds taken off in quadrature: ``noise`` is the mean
-    that another measurement of the same surface would show; a fit follows some of it, and
-    differences shall be overrated rather than underrated. ``raw_mean`` and
-    ``raw_percentile_95`` are as they come. ``quadrature_error`` is the standard error of
-    ``raw_mean`` that follows from the nodes. Colour differences are CIEDE2000.
+    with half of what the data's noise adds taken off in quadrature, and what is not known
+    between the samples added: ``noise`` is the mean that another measurement of the same
+    surface would show, ``interpolation`` that another interpolation of the same data does.
+    A fit follows some of the noise, and differences shall be overrated rather than
+    underrated. ``raw_mean`` and ``raw_percentile_95`` are as they come.
+    ``quadrature_error`` is the standard error of ``raw_mean`` that follows from the nodes.
+    Colour differences are CIEDE2000.
     """
 
     measure: str
@@ -54,6 +56,7 @@ class ImageError(msgspec.Struct, frozen=True):
     raw_percentile_95: float
     noise: float
     quadrature_error: float
+    interpolation: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -63,10 +66,10 @@ class Stage:
     ``lights`` are the nodes of every light in the ``picture``. What is judged is the same
     picture, or of an albedo that under an even sky: ``judged`` are its nodes, with weight
     only where the data support the value, ``weight (p,)`` of its pixels that are lit and
-    known for the most part, ``of_data`` what the data give there, and ``again`` the same
-    with new noise. ``importance (rows,)`` is how much each row matters to the picture.
-    ``extrapolated (p,)`` is the share of the light of the picture's pixels
-    that rests on directions without data near them.
+    known for the most part, ``of_data`` what the data give there, ``again`` the same with
+    new noise, and ``otherwise`` the same by another interpolation. ``importance (rows,)``
+    is how much each row matters to the picture. ``extrapolated (p,)`` is the share of the
+    light of the picture's pixels that rests on directions without data near them.
     """
 
     scene: Scene
@@ -83,6 +86,7 @@ class Stage:
     weight: np.ndarray
     of_data: Image
     again: Image
+    otherwise: Image
     importance: np.ndarray
 
     @property
@@ -108,14 +112,17 @@ class Stage:
         """How far a picture of what is judged is from that of the data."""
         raw = self.statistics(image.radiance, self.of_data.radiance)
         noise = self.statistics(self.again.radiance, self.of_data.radiance)
+        between = self.statistics(self.otherwise.radiance, self.of_data.radiance)
         first = self.statistics(image.first, self.of_data.first)
         second = self.statistics(image.second, self.of_data.second)
-        pairs = zip(raw, noise, strict=True)
-        clean = [math.sqrt(max(a * a - _NOISE_SHARE * b * b, 0.0)) for a, b in pairs]
+        told = zip(raw, noise, between, strict=True)
+        clean = [
+            math.sqrt(max(a * a - _NOISE_SHARE * b * b, 0.0) + d * d) for a, b, d in told
+        ]
         return ImageError(
             measure=self.measure.name, mean=clean[0], percentile_95=clean[1],
             raw_mean=raw[0], raw_percentile_95=raw[1], noise=noise[0],
-            quadrature_error=0.5 * abs(first[0] - second[0]),
+            quadrature_error=0.5 * abs(first[0] - second[0]), interpolation=between[0],
         )  # fmt: skip
 
     def within(self, error: ImageError) -> bool:
@@ -174,6 +181,7 @@ def set_stage(
         extrapolated=extrapolated, judged=judged, weight=weight / weight.sum(),
         of_data=within,
         again=render_values(lambda g: reference.value(g, noisy=True), judged),
+        otherwise=render_values(reference.otherwise, judged),
         importance=importance(
             rows.index.size, known, seen, whole, reference, light.tristimulus[:, 1]
         ),
