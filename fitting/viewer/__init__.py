@@ -4,7 +4,7 @@ The page is one file that loads nothing. Its graphics hardware evaluates the mod
 translated from the one definition that was fitted, so that sliders change all there is.
 """
 
+from fitting.viewer.blocks import TranslationError
 from fitting.viewer.page import fragment, page, write
-from fitting.viewer.primitives import TranslationError
 
 __all__ = ["TranslationError", "fragment", "page", "write"]

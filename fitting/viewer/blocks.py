@@ -18,6 +18,10 @@ import numpy as np
 Index = tuple[str, ...]
 
 
+class TranslationError(ValueError):
+    """A model that GLSL cannot evaluate, with what stands in the way."""
+
+
 @dataclass(eq=False)
 class Block:
     """Lines of code, and what is already computed, by nested scopes of loops."""

@@ -18,8 +18,8 @@ from jax.extend.core import ClosedJaxpr, Literal
 
 from fitting.geometry import from_components
 from fitting.model import Model
-from fitting.viewer.blocks import Block, Code, Scalar, Value
-from fitting.viewer.primitives import TranslationError, kind_of, translate
+from fitting.viewer.blocks import Block, Code, Scalar, TranslationError, Value
+from fitting.viewer.primitives import kind_of, translate
 
 _NESTED = ("jaxpr", "call_jaxpr", "fun_jaxpr")
 _DIRECTIONS = ("wi.x", "wi.y", "wi.z", "wo.x", "wo.y", "wo.z")

@@ -15,7 +15,8 @@ from fitting.viewer import TranslationError, assets
 from fitting.viewer.blocks import flat_index, literal
 from fitting.viewer.glsl import shader
 from fitting.viewer.measured import MOST_NUMBERS, packed
-from fitting.viewer.primitives import STRUCTURE, TEMPLATES
+from fitting.viewer.primitives import TEMPLATES
+from fitting.viewer.structure import STRUCTURE
 
 OWN = '''
 import jax
