@@ -161,8 +161,8 @@ def unsupported(stage: Stage, kept: Candidate) -> list[str]:
     between = kept.error.interpolation
     if between > 0:
         out.append(
-            f"another interpolation of the data differs by {amount(stage, between)} (mean), "
-            "which is added to the errors, in quadrature"
+            f"another interpolation of the data differs by {amount(stage, between)} "
+            "(mean), which is added to the errors, in quadrature"
         )
     if between > stage.measure.limits[0]:
         out.append(
