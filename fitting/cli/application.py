@@ -9,6 +9,7 @@ from cyclopts import App
 _COMMANDS = {
     "fit": "Fit models to measured reflectance or transmittance and judge the result.",
     "batch": "Fit many files, each for itself, by many processes or machines.",
+    "texels": "Fit every texel of a spatially varying sample, a million in minutes.",
     "info": "Say what is in a file: geometry, coverage, values, quality.",
     "score": "Measure a fit result against a file, without fitting.",
     "reflectance": "Reflectances, transmittances and colours of a fit or of a file.",
@@ -62,6 +63,30 @@ The last one uses a dask scheduler that runs, whose workers see the same files; 
   input("Enter ends it: ")
 
 Exit code 1 of this command: a file failed, or its fit did not converge.
+""",
+    "texels": """\
+Examples:
+  brdf texels wood.h5 -m 'lambert + ggx' -o wood.texels.h5
+  brdf texels wood.h5 --workers 2                 processes share the chunks
+  brdf texels wood.h5 --resume                    goes on, however it was ended
+  brdf texels wood.h5 --fix ggx.f90=1 --bounds ggx.alpha=0.02:0.8
+
+FILE is HDF5: theta_i, phi_i, theta_r, phi_r (n), with the attribute units =
+'rad' or 'deg', and value (t, n, c) or (h, w, n, c): texels, directions,
+channels; BSDF in 1/sr without cosine, NaN where unknown. Optional: valid and
+sigma like value, channel (c), wavelength (c) in nm. From arrays, with h5py:
+
+  with h5py.File("wood.h5", "w") as file:
+      for name, angle in directions.items():
+          file[name] = angle
+          file[name].attrs["units"] = "deg"
+      file["value"] = values
+
+The result holds parameters/NAME and uncertainties/NAME, (t) or (t, c), and cost,
+converged, steps, used, runner_up (t). Data are read in chunks: memory does not
+grow with the file.
+
+Exit code 1 of this command: no texel converged, or it did not come to its end.
 """,
     "info": "Example: brdf info paint.astm\n",
     "score": "Example: brdf score other_sample.astm paint.fit.json\n",

@@ -1,0 +1,74 @@
+"""What is done with one chunk of texels: fitted, and written in one piece."""
+
+from __future__ import annotations
+
+import functools
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+RECIPE = "recipe.json"
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Indices of the first axis, from ``first`` up to ``last``."""
+
+    first: int
+    last: int
+
+
+@dataclass(frozen=True)
+class FitTexels:
+    """Fits chunks of a file and writes their parts into a folder.
+
+    ``recipe`` is everything that results depend on, as JSON text: the file, the model, the
+    settings, the versions. Gives back how many texels there were and how many converged.
+    """
+
+    path: Path
+    folder: Path
+    recipe: str
+    lines: int
+
+    def __call__(self, chunk: Chunk) -> tuple[int, int]:
+        """Raises ``OSError`` where the part cannot be written."""
+        import jax
+
+        from fitting.cli import jax_setup
+
+        jax_setup.set_up()
+        from fitting.texels.fits import fit_block, named
+        from fitting.texels.target import flat, write_part
+
+        with jax.enable_x64(True):
+            source, task = _common(self.path, self.recipe)
+            texels = source.texels // source.shape[0] * self.lines
+            found = fit_block(task, *source.read(chunk.first, chunk.last), size=texels)
+            others = ("cost", "converged", "steps", "used", "runner_up")
+            arrays = flat(*named(task, found), {k: found[k] for k in others})
+        write_part(self.folder, chunk.first, arrays)
+        return found["cost"].shape[0], int(found["converged"].sum())
+
+
+def settings_of(recipe: str) -> tuple[str, dict[str, Any]]:
+    """The model and the arguments of `FitOptions` that a recipe states."""
+    said = json.loads(recipe)
+    return said["model"], said["settings"]
+
+
+@functools.lru_cache(maxsize=1)
+def _common(path: Path, recipe: str):
+    """The file and the task, once per process. Call with x64 enabled."""
+    from fitting.model import Model
+    from fitting.texels.fits import texel_options
+    from fitting.texels.source import open_source
+    from fitting.texels.task import make_task
+
+    model, settings = settings_of(recipe)
+    source = open_source(path)
+    task = make_task(
+        source.directions, source.shape[-1], Model(model), texel_options(settings)
+    )
+    return source, task

@@ -1,0 +1,88 @@
+"""What is known of a texel at the end: parameters, their uncertainties, how it went."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from fitting.texels.descent import State
+from fitting.texels.spread import Spread, spread
+from fitting.texels.task import Task
+
+
+class Outcome(NamedTuple):
+    """One texel's: all shape parameters and coefficients, in the unknowns' order.
+
+    Uncertainties (k = 1) are NaN for what is fixed or held by a bound; all is NaN where
+    too few values are known. ``used`` counts values of all channels.
+    """
+
+    shape: Float[Array, " s"]
+    coefficients: Float[Array, "q c"]
+    shape_uncertainty: Float[Array, " s"]
+    coefficient_uncertainty: Float[Array, "q c"]
+    cost: Float[Array, ""]
+    converged: Bool[Array, ""]
+    steps: Int[Array, ""]
+    used: Int[Array, ""]
+
+
+def outcome(
+    task: Task,
+    heavy: Float[Array, "w n"],
+    values: Float[Array, "c n"],
+    state: State,
+    used: Int[Array, " c"],
+) -> Outcome:
+    """The outcome of a descent, of a texel with so many known values per channel."""
+    unknowns, b = task.problem.unknowns, state.blocks
+    k, m = state.u.shape[0], b.x.shape[1]
+    number = jnp.sum(used)
+    # As many values as coefficients in every channel, and as unknowns in all.
+    enough = jnp.all(used >= m) & (number >= m * used.size + k) & jnp.isfinite(b.cost)
+
+    def kept(rows: list[Array], *size: int) -> Array:
+        if not rows:
+            return jnp.zeros((0, *size), dtype=b.x.dtype)
+        wide = [jnp.broadcast_to(jnp.asarray(r, b.x.dtype), size) for r in rows]
+        return jnp.where(enough, jnp.stack(wide), jnp.nan)
+
+    shape = unknowns.shape(state.u)
+    values_x = jax.vmap(unknowns.coefficients)(b.x, unknowns.coefficient_constant.T)
+    known = spread(task, heavy, values, state)
+    channels = used.size
+    return Outcome(
+        shape=kept([shape[n] for n in unknowns.shape_names]),
+        coefficients=kept([values_x[n] for n in unknowns.coefficient_names], channels),
+        shape_uncertainty=kept(_of_shapes(task, state, known)),
+        coefficient_uncertainty=kept(_of_coefficients(task, known), channels),
+        cost=jnp.where(enough, b.cost, jnp.nan),
+        converged=state.done & enough,
+        steps=state.steps,
+        used=number,
+    )
+
+
+def _of_shapes(task: Task, state: State, known: Spread) -> list[Array]:
+    """Every shape parameter depends on one unknown, through the map onto its support."""
+    unknowns = task.problem.unknowns
+    slopes = jax.jacfwd(unknowns.shape)(state.u)
+    return [
+        jnp.abs(slopes[name][index]) * known.u[index]
+        if index >= 0
+        else jnp.asarray(jnp.nan)
+        for name, (index, _) in zip(
+            unknowns.shape_names, unknowns.shape_source, strict=True
+        )
+    ]
+
+
+def _of_coefficients(task: Task, known: Spread) -> list[Array]:
+    source = task.problem.unknowns.coefficient_source
+    return [
+        factor * known.x[:, index] if index >= 0 else jnp.asarray(jnp.nan)
+        for index, factor in source
+    ]

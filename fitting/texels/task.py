@@ -1,0 +1,188 @@
+"""What all texels have in common: directions, model, unknowns, weights, candidates."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from data_formats import Channel, Measurement
+from fitting import problem as problems
+from fitting.expression import ModelError
+from fitting.model import Model
+from fitting.objectives import OBJECTIVES
+from fitting.options import FitOptions
+from fitting.reduced import Problem, amplitudes
+from fitting.rows import select_rows
+from fitting.starts import candidates
+from fitting.texels.box import Box, make_box
+
+# So that reductions over rows have no remainder.
+_ROWS_AT_ONCE = 8
+_APART = 0.7
+_OFF = {"robust": False, "per_channel_shape": False, "energy": 0, "reciprocity": 0}
+_LINEAR = tuple(name for name, o in OBJECTIVES.items() if o.linear)
+
+
+class Task(eqx.Module):
+    """Arrays that all texels share, of the rows that are used (``n``, padded).
+
+    ``problem`` is that of a texel, whose values are not looked at. A residual is ``heavy
+    (f - y)``, ``heavy (1 or c, n)`` in the fit's own weights. ``points (p, k)`` are shapes
+    to begin from, ``apart (p, p)`` tells which of them are far from each other. At these
+    the model is ``offset + columns x``, linearised at ``x = 0``: ``columns (d, m, p, n)``
+    and ``offset (d, p, n)`` for all channels alike (d = 1) or not. Where amplitudes are
+    linear they are ``constant (c, b) + mixing x``.
+    """
+
+    problem: Problem
+    box: Box
+    heavy: Float[Array, "w n"]
+    points: Float[Array, "p k"]
+    apart: Array
+    columns: Float[Array, "d m p n"]
+    offset: Float[Array, "d p n"]
+    shifted: bool = eqx.field(static=True)
+    n_basis: int = eqx.field(static=True)
+    mixing: tuple[tuple[float, ...], ...] | None = eqx.field(static=True)
+    constant: Float[Array, "c b"]
+    rows: np.ndarray
+
+    @property
+    def used(self) -> Array:
+        """How many rows count, ``(1 or c,)``."""
+        return jnp.sum(self.heavy > 0, axis=-1)
+
+    @property
+    def channels(self) -> int:
+        """How many there are."""
+        return self.box.low.shape[0]
+
+
+def check_options(options: FitOptions) -> None:
+    """Raises `ModelError` for what is not done for texels."""
+    if options.objective not in _LINEAR:
+        raise ModelError(
+            f"texels are fitted with one of the objectives {', '.join(_LINEAR)}, in which "
+            f"the residual is linear in the model's value; found {options.objective!r}"
+        )
+    for name, off in _OFF.items():
+        if getattr(options, name) != off:
+            raise ModelError(
+                f"texels are fitted without {name}; found {getattr(options, name)!r}"
+            )
+    if options.objective == "chi2" and options.noise is not None:
+        raise ModelError("texels take chi2 with standard uncertainties, not with noise")
+    if options.material:
+        raise ModelError("texels take no material; fix the lobe's parameters instead")
+    if isinstance(options.weights, np.ndarray):
+        raise ModelError("texels take the weights 'solid-angle' or 'rows'")
+
+
+def make_task(
+    angles: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    channels: int,
+    model: Model,
+    options: FitOptions,
+) -> Task:
+    """The task for directions ``theta_i, phi_i, theta_r, phi_r`` (each ``(n,)``, rad).
+
+    Raises `ModelError` for options that are not for texels and `MeasurementError` if no
+    row is left. Call with x64 enabled.
+    """
+    check_options(options)
+    measurement = _stand_in(angles, channels, with_sigma=options.objective == "chi2")
+    rows = select_rows(measurement, options.max_theta_deg, model.ways)
+    problem = problems.prepare(rows, model, options)
+    if problem.unknowns.spectral:
+        raise ModelError(
+            "texels take one value for all channels of a shape parameter that is fixed"
+        )
+    n = rows.index.size
+    problem = _first_rows(problem, -(-n // _ROWS_AT_ONCE) * _ROWS_AT_ONCE)
+    points = candidates(problem)
+    columns, offset = _linearised(problem, jnp.asarray(points))
+    n_basis, mixing, constant = _amplitudes(problem)
+    far = np.max(np.abs(points[:, None] - points[None]), axis=-1, initial=0.0)
+    shifted = bool(np.any(np.asarray(offset)))
+    return Task(
+        problem=problem,
+        box=make_box(problem.unknowns),
+        heavy=problem.weight * problem.kappa,
+        points=jnp.asarray(points),
+        apart=jnp.asarray(far > _APART),
+        columns=columns,
+        offset=offset,
+        shifted=shifted,
+        n_basis=n_basis,
+        mixing=mixing,
+        constant=constant,
+        rows=rows.index,
+    )
+
+
+def _stand_in(angles, channels: int, *, with_sigma: bool) -> Measurement:
+    """A measurement in these directions: what rows, weights and unknowns are made from."""
+    value = np.ones((np.size(angles[0]), channels))
+    return Measurement(
+        *angles,
+        value=value,
+        valid=np.ones(value.shape, dtype=bool),
+        channels=tuple(Channel(f"{k}") for k in range(channels)),
+        sigma=value if with_sigma else None,
+    )
+
+
+def _first_rows(problem: Problem, count: int) -> Problem:
+    """The problem without most of its padding, which is for files of about equal size."""
+
+    def first(a):
+        return a[..., :count]
+
+    return dataclasses.replace(
+        problem,
+        chunk=count,
+        geometry=jax.tree.map(first, problem.geometry),
+        angles=None,
+        angle_rows=None,
+        **{
+            name: first(getattr(problem, name))
+            for name in ("kappa", "weight", "target", "linear_target", "linear_weight")
+        },
+    )
+
+
+def _amplitudes(
+    problem: Problem,
+) -> tuple[int, tuple[tuple[float, ...], ...] | None, Array]:
+    """How many there are, and how they follow from the coefficients if that is linear."""
+    unknowns = problem.unknowns
+    x0 = jnp.zeros((problem.target.shape[0], unknowns.n_coefficients))
+    a, da_dx, _ = amplitudes(problem, jnp.zeros(unknowns.n_shape), x0)
+    if not all(lobe.linear for lobe in problem.model.lobes):
+        return a.shape[1], None, a
+    rows = np.asarray(da_dx[0]).tolist()
+    return a.shape[1], tuple(map(tuple, rows)), a
+
+
+def _linearised(problem: Problem, points: Array) -> tuple[Array, Array]:
+    """``columns (d, m, p, n)`` and ``offset (d, p, n)`` of the model at every point."""
+    unknowns, channels = problem.unknowns, problem.target.shape[0]
+    x0 = jnp.zeros((channels, unknowns.n_coefficients))
+
+    def at(u: Array) -> tuple[Array, Array]:
+        basis = problem.model.basis(unknowns.shape(u), problem.geometry)
+        wide = jnp.stack([jnp.broadcast_to(b, problem.kappa.shape) for b in basis])
+        a, da_dx, _ = amplitudes(problem, u, x0)
+        return jnp.einsum("cbm,bn->cmn", da_dx, wide), a @ wide
+
+    columns, offset = jax.lax.map(at, points)
+    columns, offset = jnp.moveaxis(columns, 0, 2), jnp.moveaxis(offset, 0, 1)
+    alike = np.all(np.asarray(columns) == columns[:1]) and np.all(
+        np.asarray(offset) == offset[:1]
+    )
+    return (columns[:1], offset[:1]) if alike else (columns, offset)
