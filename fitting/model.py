@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import Any, get_args
 
@@ -87,10 +88,7 @@ class Model(eqx.Module):
 
     def n_basis(self, index: int) -> int:
         """Number of basis functions of one lobe."""
-        lobe = self.lobes[index]
-        shape = {p.name: 0.5 for p in lobe.parameters() if not p.coefficient}
-        normal = from_angles([0.0], 0.0, [0.0], 0.0)
-        return len(jax.eval_shape(lobe.basis, shape, normal))
+        return _n_basis(self.lobes[index])
 
     def of_lobe(self, index: int, values: Mapping[str, Any]) -> dict[str, Any]:
         """The values of one lobe under their short names."""
@@ -178,3 +176,11 @@ def _make_lobe(term: expr.Term) -> Lobe:
     lobe = cls(**options)
     lobe = Retro(lobe) if retro else lobe
     return TurnedOver(lobe) if back else lobe
+
+
+@functools.cache
+def _n_basis(lobe: Lobe) -> int:
+    # Tracing a lobe takes milliseconds, and its answer never changes.
+    shape = {p.name: 0.5 for p in lobe.parameters() if not p.coefficient}
+    normal = from_angles([0.0], 0.0, [0.0], 0.0)
+    return len(jax.eval_shape(lobe.basis, shape, normal))
