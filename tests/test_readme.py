@@ -89,17 +89,6 @@ def test_linked_files_exist():
     assert (ROOT / "fitting" / "fit_result.schema.json").exists()
 
 
-def test_the_picture_is_drawn_by_its_script(tmp_path, monkeypatch):
-    monkeypatch.setenv("MPLBACKEND", "agg")
-    sys.path.insert(0, str(ROOT / "notebooks"))
-    try:
-        import readme_picture
-    finally:
-        sys.path.pop(0)
-    readme_picture.draw(tmp_path / "picture.png")
-    assert (tmp_path / "picture.png").stat().st_size > 10_000
-
-
 @pytest.mark.slow
 def test_the_table_of_real_files_is_current(real_data):
     """Numbers of the table, to 1 %, and the promises made with it."""
