@@ -20,10 +20,11 @@ from fitting.texels.arrow import evaluate
 from fitting.texels.box import held_at
 from fitting.texels.task import Task
 
-# The promised decrease at which a texel is finished, as a share of its cost: parameters
-# are then within 1e-5 of a standard uncertainty. ATOL is a share of the weighted data.
-RTOL = 1e-10
-ATOL = 1e-24
+# The promised decrease, as a share of the cost, at which one step more is the last and its
+# end is not looked at again: that is within 1e-3 of a standard uncertainty of the minimum,
+# and costs less than 1e-9 more. The second one is a share of the weighted data.
+_LAST_STEP = 1e-6
+_NO_STEP = 1e-20
 _MAX_SHAPE_STEP = 1.5
 _FIRST_DAMPING = 1e-3
 _NOTICEABLE = 1e-10
@@ -32,7 +33,10 @@ _STUCK = 1e12
 
 
 class State(NamedTuple):
-    """Where a texel is (``u``, the blocks there) and what it will try next."""
+    """Where a texel is (``u``, the blocks there) and what it will try next.
+
+    At the end the last step is still ahead.
+    """
 
     u: Float[Array, " k"]
     blocks: Blocks
@@ -92,8 +96,11 @@ def descend(
         noticed = first | (gained > _NOTICEABLE * new.cost)
         idle = jnp.where(accept, jnp.where(noticed, 0, s.idle + 1), s.idle)
         next_u, next_x, predicted = propose(task, u, blocks, damping)
-        done = predicted <= RTOL * blocks.cost + ATOL * scale
-        done = done | (damping > _STUCK) | (idle >= _MAX_IDLE)
+        near = predicted <= _LAST_STEP * blocks.cost + _NO_STEP * scale
+        stuck = (damping > _STUCK) | (idle >= _MAX_IDLE)
+        next_u = jnp.where(stuck, u, next_u)
+        next_x = jnp.where(stuck, blocks.x, next_x)
+        done = near | stuck
         return State(
             u, blocks, next_u, next_x, damping, growth, predicted, idle, s.steps + 1, done
         )

@@ -23,9 +23,10 @@ from fitting.texels.outcome import Outcome, outcome
 from fitting.texels.scan import scan
 from fitting.texels.task import Task
 
-# Texels in lockstep, and in one call.
-_ABREAST = 128
-BATCH = 1024
+# Texels in lockstep, and in one call. Loops in vector registers may leave their last
+# elements to scalar code, which rounds differently: there are spare ones, never looked at.
+_ABREAST, _SPARE = 128, 16
+BATCH = 8 * (_ABREAST - _SPARE)
 _FEW_STEPS = 5
 _MAX_STEPS = 200
 _STARTS = 2
@@ -43,13 +44,10 @@ def _compiled(function: Callable) -> Callable[..., Any]:
 
 
 class _Data(NamedTuple):
-    """Of a chunk: values ``(t, c, n)``, 0 where unknown, and weights of each texel's own.
-
-    ``heavy`` is only looked at where a texel's weights are not those of all.
-    """
+    """Of a chunk: ``values (t, n, c)`` of all rows as in the file, and ``sigma`` if any."""
 
     values: Array
-    heavy: Array
+    sigma: Array | None
 
 
 def fit_chunk(
@@ -60,8 +58,10 @@ def fit_chunk(
     ``values (t, n, c)`` have all rows of the file, NaN where unknown; so has ``sigma``.
     Chunks of one size ``t`` share compiled code. Call with x64 enabled.
     """
-    data, complete, used = _arranged(task, values, sigma)
-    alike = np.asarray(complete)[:count] & (sigma is None)
+    data = _Data(jnp.asarray(values), None if sigma is None else jnp.asarray(sigma))
+    used = _counted(task, data)
+    complete = np.all(np.asarray(used) == np.asarray(task.used), axis=-1)[:count]
+    alike = complete & (sigma is None)
     out: dict[str, np.ndarray] = {}
     for own_weights in (False, True):
         texels = np.flatnonzero(alike != own_weights)
@@ -82,7 +82,7 @@ def _fit(
     which = np.repeat([0, 1], [texels.size, int(second.sum())])
     state = _descended(
         task, data, texels[job], own_weights,
-        np.asarray(task.points)[starts.candidate[job, which]], starts.x[job, which],
+        starts.u[job, which], starts.x[job, which],
     )  # fmt: skip
     state = _pulled_back(task, data, texels[job], own_weights, state)
     end = jax.tree.map(lambda v: v[: texels.size].copy(), state)
@@ -153,32 +153,36 @@ def _in_batches(function: Any, items: np.ndarray, arrays: Any) -> Any:
 # ---------------------------------------------------------------- compiled
 
 
+def _known(data: _Data) -> Array:
+    known = jnp.abs(data.values) < _LARGEST
+    if data.sigma is not None:
+        known = known & (data.sigma > 0) & (data.sigma < _LARGEST)
+    return known
+
+
 @_compiled
-def _arranged(
-    task: Task, raw: np.ndarray, sigma: np.ndarray | None
-) -> tuple[_Data, Array, Array]:
-    """Values and weights, whether all values are known, and how many, ``(t, c)``."""
-    padding = ((0, 0), (0, 0), (0, task.heavy.shape[-1] - task.rows.size))
-
-    def arranged(v) -> Array:
-        rows = jnp.swapaxes(v[:, task.rows, :], 1, 2).astype(task.heavy.dtype)
-        return jnp.pad(rows, padding)
-
-    known = jnp.abs(raw) < _LARGEST
-    if sigma is not None:
-        known = known & (sigma > 0) & (sigma < _LARGEST)
-    values, valid = arranged(jnp.where(known, raw, 0.0)), arranged(known)
-    heavy = valid * task.heavy
-    if sigma is not None:
-        heavy = heavy / arranged(jnp.where(known, sigma, 1.0)).clip(1e-300)
-    used = jnp.sum(valid * (task.heavy > 0), axis=-1).astype(int)
-    complete = jnp.all(used == task.used, axis=-1)
-    return _Data(values, heavy), complete, used
+def _counted(task: Task, data: _Data) -> Array:
+    """How many values of every texel are known and count, ``(t, c)``."""
+    counts = (task.heavy > 0)[:, : task.rows.size].T
+    return jnp.sum(_known(data)[:, task.rows] & counts, axis=1)
 
 
 def _of(task: Task, data: _Data, texels: Array, own_weights: bool) -> tuple[Array, Array]:
-    heavy = data.heavy[texels] if own_weights else task.heavy[None]
-    return heavy, data.values[texels]
+    """Weights and values ``(t, c, n)`` of some texels; of weights, a leading 1 for all."""
+    some = jax.tree.map(lambda v: v[texels], data)
+    padding = ((0, 0), (0, 0), (0, task.heavy.shape[-1] - task.rows.size))
+
+    def arranged(v: Array) -> Array:
+        rows = jnp.swapaxes(v[:, task.rows], 1, 2).astype(task.heavy.dtype)
+        return jnp.pad(rows, padding)
+
+    if not own_weights:
+        return task.heavy[None], arranged(some.values)
+    known = _known(some)
+    heavy = task.heavy * arranged(known)
+    if some.sigma is not None:
+        heavy = heavy / (arranged(jnp.where(known, some.sigma, 1.0)) + (heavy == 0))
+    return heavy, arranged(jnp.where(known, some.values, 0.0))
 
 
 @_compiled
@@ -221,8 +225,13 @@ def _finished(
 
 
 def _abreast(function: Any, arrays: Any) -> Any:
-    def split(v):
-        return jnp.asarray(v).reshape(-1, _ABREAST, *jnp.shape(v)[1:])
+    """``function`` of a batch, for so many at a time."""
+    own = _ABREAST - _SPARE
+
+    def split(v: Array) -> Array:
+        parts = jnp.asarray(v).reshape(-1, own, *jnp.shape(v)[1:])
+        spare = [(0, 0), (0, _SPARE)] + [(0, 0)] * (parts.ndim - 2)
+        return jnp.pad(parts, spare, mode="edge")
 
     out = jax.lax.map(function, jax.tree.map(split, arrays))
-    return jax.tree.map(lambda v: v.reshape(-1, *v.shape[2:]), out)
+    return jax.tree.map(lambda v: v[:, :own].reshape(-1, *v.shape[2:]), out)

@@ -42,7 +42,12 @@ def outcome(
     k, m = state.u.shape[0], b.x.shape[1]
     number = jnp.sum(used)
     # As many values as coefficients in every channel, and as unknowns in all.
-    enough = jnp.all(used >= m) & (number >= m * used.size + k) & jnp.isfinite(b.cost)
+    known = spread(task, heavy, values, state, state.next_u, state.next_x)
+    better = known.cost <= b.cost
+    u = jnp.where(better, state.next_u, state.u)
+    x = jnp.where(better, state.next_x, b.x)
+    cost = jnp.where(better, known.cost, b.cost)
+    enough = jnp.all(used >= m) & (number >= m * used.size + k) & jnp.isfinite(cost)
 
     def kept(rows: list[Array], *size: int) -> Array:
         if not rows:
@@ -50,26 +55,25 @@ def outcome(
         wide = [jnp.broadcast_to(jnp.asarray(r, b.x.dtype), size) for r in rows]
         return jnp.where(enough, jnp.stack(wide), jnp.nan)
 
-    shape = unknowns.shape(state.u)
-    values_x = jax.vmap(unknowns.coefficients)(b.x, unknowns.coefficient_constant.T)
-    known = spread(task, heavy, values, state)
+    shape = unknowns.shape(u)
+    values_x = jax.vmap(unknowns.coefficients)(x, unknowns.coefficient_constant.T)
     channels = used.size
     return Outcome(
         shape=kept([shape[n] for n in unknowns.shape_names]),
         coefficients=kept([values_x[n] for n in unknowns.coefficient_names], channels),
-        shape_uncertainty=kept(_of_shapes(task, state, known)),
+        shape_uncertainty=kept(_of_shapes(task, u, known)),
         coefficient_uncertainty=kept(_of_coefficients(task, known), channels),
-        cost=jnp.where(enough, b.cost, jnp.nan),
+        cost=jnp.where(enough, cost, jnp.nan),
         converged=state.done & enough,
         steps=state.steps,
         used=number,
     )
 
 
-def _of_shapes(task: Task, state: State, known: Spread) -> list[Array]:
+def _of_shapes(task: Task, u: Array, known: Spread) -> list[Array]:
     """Every shape parameter depends on one unknown, through the map onto its support."""
     unknowns = task.problem.unknowns
-    slopes = jax.jacfwd(unknowns.shape)(state.u)
+    slopes = jax.jacfwd(unknowns.shape)(u)
     return [
         jnp.abs(slopes[name][index]) * known.u[index]
         if index >= 0

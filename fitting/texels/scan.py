@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from fitting import qp
 from fitting.texels.box import best_of_choices
@@ -18,9 +19,9 @@ from fitting.texels.task import Task
 
 
 class Starts(NamedTuple):
-    """The best distinct candidates of every texel, best first, with their costs."""
+    """The best distinct starts of every texel, best first, with their candidates' costs."""
 
-    candidate: Int[Array, "t s"]
+    u: Float[Array, "t s k"]
     cost: Float[Array, "t s"]
     x: Float[Array, "t s c m"]
 
@@ -56,13 +57,17 @@ def scan(
     ``heavy`` has a leading 1 where all texels have the same weights. A cost is infinite
     where there is no further candidate.
     """
+    exact = values.dtype
+    # Half the precision and time: what is found here is only where to begin.
+    task, heavy, values = jax.tree.map(_single, (task, heavy, values))
     quadratics = _quadratics(task, heavy, values)
     _, cost = _minimised(task, quadratics)
     left = jnp.where(jnp.isfinite(cost), jnp.maximum(cost, 0.0), jnp.inf)
-    chosen, costs = [], []
+    chosen, places, costs = [], [], []
     for _ in range(count):
         best = jnp.argmin(left, axis=1)
         chosen.append(best)
+        places.append(_between(task, cost, best))
         costs.append(jnp.take_along_axis(left, best[:, None], axis=1)[:, 0])
         left = jnp.where(task.apart[best], left, jnp.inf)
     index = jnp.stack(chosen, axis=1)
@@ -72,7 +77,36 @@ def scan(
         found = jnp.zeros((*shape, 0), dtype=values.dtype)
     else:
         found = jnp.stack([jnp.broadcast_to(v, shape) for v in x], axis=-1)
-    return Starts(index, jnp.stack(costs, axis=1), jnp.swapaxes(found, 1, 2))
+    starts = Starts(
+        jnp.stack(places, axis=1), jnp.stack(costs, axis=1), jnp.swapaxes(found, 1, 2)
+    )
+    return jax.tree.map(lambda v: v.astype(exact), starts)
+
+
+def _single(v: Array) -> Array:
+    return v.astype(jnp.float32) if v.dtype == jnp.float64 else v
+
+
+def _between(task: Task, cost: Array, best: Array) -> Array:
+    """The shape ``(t, k)`` of the best candidate; of one unknown, whose candidates are in
+    order, the minimum of the parabola through its neighbours."""
+    points = task.points
+    if points.shape[1] != 1 or points.shape[0] < 3:
+        return points[best]
+    middle = jnp.clip(best, 1, points.shape[0] - 2)
+    below, here, above = (
+        jnp.take_along_axis(cost, (middle + d)[:, None], axis=1)[:, 0] for d in (-1, 0, 1)
+    )
+    bend = below - 2.0 * here + above
+    slope = below - above
+    usable = (bend > 0) & jnp.isfinite(bend) & (middle == best)
+    step = jnp.where(usable, 0.5 * slope / jnp.where(usable, bend, 1.0), 0.0)
+    lower, centre, upper = (points[middle + d] for d in (-1, 0, 1))
+    step = jnp.clip(step, -0.6, 0.6)[:, None]
+    between = centre + step * (
+        0.5 * (upper - lower) + 0.5 * step * (upper - 2 * centre + lower)
+    )
+    return jnp.where(usable[:, None], between, points[best])
 
 
 def _minimised(task: Task, q: _Quadratics) -> tuple[list[Array], Array]:

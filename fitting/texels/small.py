@@ -12,9 +12,9 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Array
 
-# Pivots are kept above this share of the diagonal: singular systems stay usable in the
-# directions that the data determine.
-_RIDGE = 1e-14
+# Pivots are kept above this share of the diagonal, in roundings: singular systems stay
+# usable in the directions that the data determine.
+_RIDGE = 50.0
 
 # A number where it is known when the code is compiled.
 Element = Array | float
@@ -33,7 +33,9 @@ def solve(matrix: Matrix, rights: Sequence[Vector]) -> list[list[Array]]:
             known = [row[p] * pivots[p] * lower[j][p] for p in range(j)]
             row.append((matrix[i][j] - sum(known)) / pivots[j])
         left = matrix[i][i] - sum(row[p] * row[p] * pivots[p] for p in range(i))
-        pivots.append(jnp.maximum(left, _RIDGE * jnp.abs(matrix[i][i]) + 1e-300))
+        rounding = jnp.finfo(left.dtype)
+        least = _RIDGE * rounding.eps * jnp.abs(matrix[i][i]) + rounding.tiny
+        pivots.append(jnp.maximum(left, least))
         lower.append(row)
     solutions: list[list[Array]] = []
     for right in rights:

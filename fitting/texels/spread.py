@@ -22,16 +22,24 @@ _LEAST_FREEDOM = 1e-3
 
 
 class Spread(NamedTuple):
-    """Standard uncertainties of the unknowns; NaN of a coefficient that a bound holds."""
+    """Standard uncertainties of the unknowns, NaN of a coefficient that a bound holds; and
+    the cost at ``(u, x)``."""
 
     u: Float[Array, " k"]
     x: Float[Array, "c m"]
+    cost: Float[Array, ""]
 
 
 def spread(
-    task: Task, heavy: Float[Array, "w n"], values: Float[Array, "c n"], state: State
+    task: Task,
+    heavy: Float[Array, "w n"],
+    values: Float[Array, "c n"],
+    state: State,
+    u: Float[Array, " k"],
+    x: Float[Array, "c m"],
 ) -> Spread:
-    """The square roots of the sandwich's diagonal."""
+    """The square roots of the sandwich's diagonal at ``(u, x)``, where the state's blocks
+    still hold."""
     b = state.blocks
     (channels, m), k = b.x.shape, state.u.shape[0]
     free, h_xx, h_xu = on_free(task, b)
@@ -46,8 +54,8 @@ def spread(
     unit = [[jnp.asarray(float(p == q)) for p in range(k)] for q in range(k)]
     of_u = small.solve(schur, unit)
 
-    pulls, own = [], []
-    for c, (value, in_x, in_u) in enumerate(columns(task, state.u, b.x)):
+    pulls, own, squares = [], [], []
+    for c, (value, in_x, in_u) in enumerate(columns(task, u, x)):
         w = heavy[min(c, heavy.shape[0] - 1)]
         in_x = [jnp.where(free[c, i], w * v, 0.0) for i, v in enumerate(in_x)]
         # What a row tells of the shape when the coefficients have followed.
@@ -59,7 +67,9 @@ def spread(
         leverage = small.dot(in_x, ahead)
         leverage = leverage + small.dot(alone, [small.dot(r, alone) for r in of_u])
         rest = jnp.maximum(1.0 - leverage, _LEAST_FREEDOM)
-        r = w * (value - values[c]) / jnp.sqrt(rest)
+        plain = w * (value - values[c])
+        r = plain / jnp.sqrt(rest)
+        squares.append(plain * plain)
         pulls.append([v * r for v in alone])
         own.append([v * r for v in ahead])
     moved = [small.dot(row, [sum(p[q] for p in pulls) for q in range(k)]) for row in of_u]
@@ -69,5 +79,7 @@ def spread(
             own[c][i] - small.dot([responses[q][i][c] for q in range(k)], moved)
             for i in range(m)
         ]
-    sums = jnp.sqrt(jnp.stack(add_up([v * v for v in influence])))
-    return Spread(sums[:k], jnp.where(free, sums[k:].reshape(channels, m), jnp.nan))
+    *sums, cost = add_up([*(v * v for v in influence), sum(squares)])
+    found = jnp.sqrt(jnp.stack(sums)) if sums else jnp.zeros(0)
+    of_x = found[k:].reshape(channels, m)
+    return Spread(found[:k], jnp.where(free, of_x, jnp.nan), cost)
