@@ -124,7 +124,7 @@ def settle(file: Path, choices: TexelChoices, who: TexelWork) -> TexelJob:
         source=source,
         model=model,
         target=target,
-        work=FitTexels(file.absolute(), folder, json.dumps(recipe, sort_keys=True), lines),
+        work=FitTexels(file.absolute(), folder, json.dumps(recipe, sort_keys=True)),
         chunks=tuple(
             Chunk(first, min(first + lines, source.shape[0]))
             for first in range(0, source.shape[0], lines)

@@ -30,7 +30,6 @@ class FitTexels:
     path: Path
     folder: Path
     recipe: str
-    lines: int
 
     def __call__(self, chunk: Chunk) -> tuple[int, int]:
         """Raises ``OSError`` where the part cannot be written."""
@@ -44,8 +43,7 @@ class FitTexels:
 
         with jax.enable_x64(True):
             source, task = _common(self.path, self.recipe)
-            texels = source.texels // source.shape[0] * self.lines
-            found = fit_block(task, *source.read(chunk.first, chunk.last), size=texels)
+            found = fit_block(task, *source.read(chunk.first, chunk.last))
             others = ("cost", "converged", "steps", "used", "runner_up")
             arrays = flat(*named(task, found), {k: found[k] for k in others})
         write_part(self.folder, chunk.first, arrays)

@@ -89,14 +89,13 @@ def fit_many(
     with jax.enable_x64(True):
         task = make_task(angles, channels, model, options)  # pyright: ignore[reportArgumentType]
         lines = lines_per_chunk(values.shape)
-        size = lines * math.prod(leading[1:])
         for first in range(0, leading[0], lines):
             here = slice(first, first + lines)
             block = [
                 None if v is None else np.asarray(v[here]).reshape(-1, n, channels)
                 for v in (values, sigma, valid)
             ]
-            parts.append(fit_block(task, *block, size=size))  # pyright: ignore
+            parts.append(fit_block(task, *block))  # pyright: ignore
             if progress is not None:
                 progress(min(first + lines, leading[0]) * math.prod(leading[1:]))
     whole = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
@@ -112,22 +111,12 @@ def lines_per_chunk(shape: tuple[int, ...]) -> int:
 
 
 def fit_block(
-    task: Task,
-    values: np.ndarray,
-    sigma: np.ndarray | None,
-    valid: np.ndarray | None,
-    *,
-    size: int,
+    task: Task, values: np.ndarray, sigma: np.ndarray | None, valid: np.ndarray | None
 ) -> dict[str, np.ndarray]:
-    """`fit_chunk` of up to ``size`` texels, by code that is compiled for that size."""
-    count = values.shape[0]
+    """`fit_chunk` of values ``(t, n, c)`` that count where ``valid`` is not 0."""
     if valid is not None:
         values = np.where(valid != 0, values, np.nan)
-    missing = ((0, size - count), (0, 0), (0, 0))
-    values = np.pad(values, missing, constant_values=np.nan)
-    if sigma is not None:
-        sigma = np.pad(sigma, missing, constant_values=np.nan)
-    return {k: v[:count] for k, v in fit_chunk(task, values, sigma, count=count).items()}
+    return fit_chunk(task, values, sigma)
 
 
 def named(

@@ -20,7 +20,7 @@ from jaxtyping import Array
 from fitting import row_sums
 from fitting.texels.descent import State, begin, descend
 from fitting.texels.outcome import Outcome, outcome
-from fitting.texels.scan import scan
+from fitting.texels.scan import Starts, scan
 from fitting.texels.task import Task
 
 # Texels in lockstep, and in one call. Loops in vector registers may leave their last
@@ -44,119 +44,144 @@ def _compiled(function: Callable) -> Callable[..., Any]:
 
 
 class _Data(NamedTuple):
-    """Of a chunk: ``values (t, n, c)`` of all rows as in the file, and ``sigma`` if any."""
+    """Of texels: ``values (t, n, c)`` of all rows as in the file, and ``sigma`` if any."""
 
-    values: Array
-    sigma: Array | None
+    values: np.ndarray
+    sigma: np.ndarray | None
 
 
 def fit_chunk(
-    task: Task, values: np.ndarray, sigma: np.ndarray | None = None, *, count: int
+    task: Task, values: np.ndarray, sigma: np.ndarray | None = None
 ) -> dict[str, np.ndarray]:
-    """The fields of `Outcome`, and ``runner_up (t,)``, of the first ``count`` texels.
+    """The fields of `Outcome`, and ``runner_up (t,)``, of texels.
 
     ``values (t, n, c)`` have all rows of the file, NaN where unknown; so has ``sigma``.
-    Chunks of one size ``t`` share compiled code. Call with x64 enabled.
+    Call with x64 enabled.
     """
-    data = _Data(jnp.asarray(values), None if sigma is None else jnp.asarray(sigma))
-    used = _counted(task, data)
-    complete = np.all(np.asarray(used) == np.asarray(task.used), axis=-1)[:count]
+    data = _Data(values, sigma)
+    used = _in_batches(lambda some: _counted(task, some), data)
+    complete = np.all(used == np.asarray(task.used), axis=-1)
     alike = complete & (sigma is None)
     out: dict[str, np.ndarray] = {}
     for own_weights in (False, True):
         texels = np.flatnonzero(alike != own_weights)
         if texels.size:
-            for name, part in _fit(task, data, texels, own_weights, used).items():
-                whole = out.setdefault(name, np.zeros((count, *part.shape[1:]), part.dtype))
-                whole[texels] = part
+            part = _fit(task, _taken(data, texels), own_weights, used[texels])
+            for name, v in part.items():
+                whole = out.setdefault(
+                    name, np.zeros((used.shape[0], *v.shape[1:]), v.dtype)
+                )
+                whole[texels] = v
     return out
 
 
 def _fit(
-    task: Task, data: _Data, texels: np.ndarray, own_weights: bool, used: Array
+    task: Task, data: _Data, own_weights: bool, used: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """All of some texels whose weights are their own, or those of all."""
-    starts = _in_batches(lambda t: _scanned(task, data, t, own_weights), texels, (texels,))
-    second = starts.cost[:, 1] < _FAR_COSTLIER * starts.cost[:, 0]
-    job = np.concatenate([np.arange(texels.size), np.flatnonzero(second)])
-    which = np.repeat([0, 1], [texels.size, int(second.sum())])
-    state = _descended(
-        task, data, texels[job], own_weights,
-        starts.u[job, which], starts.x[job, which],
-    )  # fmt: skip
-    state = _pulled_back(task, data, texels[job], own_weights, state)
-    end = jax.tree.map(lambda v: v[: texels.size].copy(), state)
-    cost = np.full((2, texels.size), np.inf)
-    cost[which, job] = np.where(np.isfinite(state.blocks.cost), state.blocks.cost, np.inf)
-    better = np.flatnonzero(cost[1, second] < cost[0, second])
-    for whole, every in zip(jax.tree.leaves(end), jax.tree.leaves(state), strict=True):
-        whole[np.flatnonzero(second)[better]] = every[texels.size + better]
+    """Texels whose weights are their own, or those of all."""
+    starts = _in_batches(lambda some: _scanned(task, some, own_weights), data)
+    # A second start is refined only where it may lead to something better.
+    second = np.flatnonzero(starts.cost[:, 1] < _FAR_COSTLIER * starts.cost[:, 0])
+    state = _refined(task, data, own_weights, starts.u[:, 0], starts.x[:, 0])
+    best = np.where(np.isfinite(state.blocks.cost), state.blocks.cost, np.inf)
+    ratio = np.full(best.size, np.nan)
+    if second.size:
+        other = _refined(
+            task,
+            _taken(data, second),
+            own_weights,
+            starts.u[second, 1],
+            starts.x[second, 1],
+        )
+        costs = np.stack([best[second], other.blocks.cost])
+        costs = np.where(np.isfinite(costs), costs, np.inf)
+        _replaced(state, second, other, costs[1] < costs[0])
+        low, high = costs.min(axis=0), costs.max(axis=0)
+        apart = np.isfinite(high) & (high > low * (1.0 + _SAME_MINIMUM)) & (low > 0)
+        ratio[second[apart]] = high[apart] / low[apart]
     found = _in_batches(
-        lambda t, s: _finished(task, data, used, t, s, own_weights), texels, (texels, end)
+        lambda some, s, n: _finished(task, some, s, n, own_weights), data, state, used
     )
-    best, other = cost.min(axis=0), cost.max(axis=0)
-    apart = np.isfinite(other) & (other > best * (1.0 + _SAME_MINIMUM)) & (best > 0)
-    ratio = np.divide(other, best, out=np.full(best.size, np.nan), where=apart)
     return {**found._asdict(), "runner_up": ratio}
 
 
-def _descended(
-    task: Task, data: _Data, texels: np.ndarray, own_weights: bool, u: Any, x: Any
+def _refined(
+    task: Task, data: _Data, own_weights: bool, u: np.ndarray, x: np.ndarray
 ) -> State:
-    """The ends of descents of texels from ``u (t, k)`` and ``x (t, c, m)``."""
-    state = _in_batches(lambda u, x: _begun(task, u, x), texels, (u, x))
-    state = jax.tree.map(np.array, state)
-    waiting = np.arange(texels.size)
+    """The ends of descents from ``u (t, k)`` and ``x (t, c, m)``.
+
+    Once more from inside where a shape ended on the flat part of its support's map.
+    """
+    state = _descended(task, data, own_weights, u, x)
+    periodic = np.array([s == "periodic" for s in task.problem.unknowns.scales], dtype=bool)
+    stuck = (np.abs(state.u) > _FLAT) & ~periodic
+    again = np.flatnonzero(stuck.any(axis=1))
+    if again.size:
+        u = np.where(stuck, np.sign(state.u) * _INSIDE, state.u)[again]
+        some = _taken(data, again)
+        new = _descended(task, some, own_weights, u, state.blocks.x[again])
+        _replaced(state, again, new, new.blocks.cost < state.blocks.cost[again])
+    return state
+
+
+def _descended(
+    task: Task, data: _Data, own_weights: bool, u: np.ndarray, x: np.ndarray
+) -> State:
+    state = _in_batches(lambda u, x: _begun(task, u, x), u, x)
+    waiting = np.arange(u.shape[0])
     for until in range(_FEW_STEPS, _MAX_STEPS + 1, _FEW_STEPS):
-        part = jax.tree.map(lambda v, w=waiting: v[w], state)
+        limit = jnp.asarray(until)
         part = _in_batches(
-            lambda t, s, n=until: _gone_on(task, data, t, s, own_weights, jnp.asarray(n)),
-            waiting, (texels[waiting], part),
-        )  # fmt: skip
-        for whole, some in zip(jax.tree.leaves(state), jax.tree.leaves(part), strict=True):
-            whole[waiting] = some
+            lambda some, s, n=limit: _gone_on(task, some, s, own_weights, n),
+            _taken(data, waiting),
+            _taken(state, waiting),
+        )
+        _replaced(state, waiting, part, np.ones(waiting.size, dtype=bool))
         waiting = waiting[~part.done]
         if not waiting.size:
             break
     return state
 
 
-def _pulled_back(
-    task: Task, data: _Data, texels: np.ndarray, own_weights: bool, state: State
-) -> State:
-    """Once more from inside where a shape ended on the flat part of its support's map."""
-    periodic = np.array([s == "periodic" for s in task.problem.unknowns.scales], dtype=bool)
-    stuck = (np.abs(state.u) > _FLAT) & ~periodic
-    again = np.flatnonzero(stuck.any(axis=1))
-    if not again.size:
-        return state
-    u = np.where(stuck, np.sign(state.u) * _INSIDE, state.u)[again]
-    new = _descended(task, data, texels[again], own_weights, u, state.blocks.x[again])
-    better = new.blocks.cost < state.blocks.cost[again]
+def _taken(arrays: Any, index: np.ndarray) -> Any:
+    return jax.tree.map(lambda v: v[index], arrays)
+
+
+def _replaced(state: State, index: np.ndarray, new: State, where: np.ndarray) -> None:
+    """Put the chosen ones of new states in the places of the old ones."""
     for whole, some in zip(jax.tree.leaves(state), jax.tree.leaves(new), strict=True):
-        whole[again[better]] = some[better]
-    return state
+        whole[index[where]] = some[where]
 
 
-def _in_batches(function: Any, items: np.ndarray, arrays: Any) -> Any:
+def _in_batches(function: Any, *arrays: Any) -> Any:
     """``function(*arrays)`` of batches of one size, as numpy; the last one is filled up."""
+    count = jax.tree.leaves(arrays)[0].shape[0]
     parts = []
-    for first in range(0, items.size, BATCH):
-        index = np.minimum(np.arange(first, first + BATCH), items.size - 1)
-        batch = jax.tree.map(lambda v, i=index: np.asarray(v)[i], arrays)
-        count = min(BATCH, items.size - first)
+    for first in range(0, count, BATCH):
+        last = min(first + BATCH, count)
+        batch = jax.tree.map(lambda v, a=first, b=last: _filled(v[a:b]), arrays)
         out = jax.device_get(function(*batch))
-        parts.append(jax.tree.map(lambda v, n=count: v[:n], out))
+        parts.append(jax.tree.map(lambda v, n=last - first: v[:n], out))
     return jax.tree.map(lambda *v: np.concatenate(v), *parts)
+
+
+def _filled(v: np.ndarray) -> np.ndarray:
+    missing = BATCH - v.shape[0]
+    return v if not missing else np.concatenate([v, np.repeat(v[-1:], missing, axis=0)])
 
 
 # ---------------------------------------------------------------- compiled
 
 
-def _known(data: _Data) -> Array:
-    known = jnp.abs(data.values) < _LARGEST
+def _known(data: Any) -> Array:
+    """Which values are, and have an uncertainty if there are any."""
+
+    def is_usable(v: Array) -> Array:
+        return jnp.abs(v.astype(jnp.float64)) < _LARGEST
+
+    known = is_usable(data.values)
     if data.sigma is not None:
-        known = known & (data.sigma > 0) & (data.sigma < _LARGEST)
+        known = known & (data.sigma > 0) & is_usable(data.sigma)
     return known
 
 
@@ -167,27 +192,29 @@ def _counted(task: Task, data: _Data) -> Array:
     return jnp.sum(_known(data)[:, task.rows] & counts, axis=1)
 
 
-def _of(task: Task, data: _Data, texels: Array, own_weights: bool) -> tuple[Array, Array]:
-    """Weights and values ``(t, c, n)`` of some texels; of weights, a leading 1 for all."""
-    some = jax.tree.map(lambda v: v[texels], data)
+def _arranged(task: Task, data: Any, own_weights: bool) -> tuple[Array, Array]:
+    """Weights and values ``(t, c, n)``; of weights, a leading 1 for all texels."""
     padding = ((0, 0), (0, 0), (0, task.heavy.shape[-1] - task.rows.size))
 
-    def arranged(v: Array) -> Array:
+    def rows_last(v: Array) -> Array:
         rows = jnp.swapaxes(v[:, task.rows], 1, 2).astype(task.heavy.dtype)
         return jnp.pad(rows, padding)
 
     if not own_weights:
-        return task.heavy[None], arranged(some.values)
-    known = _known(some)
-    heavy = task.heavy * arranged(known)
-    if some.sigma is not None:
-        heavy = heavy / (arranged(jnp.where(known, some.sigma, 1.0)) + (heavy == 0))
-    return heavy, arranged(jnp.where(known, some.values, 0.0))
+        return task.heavy[None], rows_last(data.values)
+    known = _known(data)
+    heavy = task.heavy * rows_last(known)
+    if data.sigma is not None:
+        heavy = heavy / (rows_last(jnp.where(known, data.sigma, 1.0)) + (heavy == 0))
+    return heavy, rows_last(jnp.where(known, data.values, 0.0))
 
 
 @_compiled
-def _scanned(task: Task, data: _Data, texels: Array, own_weights: bool):
-    return _abreast(lambda t: scan(task, *_of(task, data, t, own_weights), _STARTS), texels)
+def _scanned(task: Task, data: _Data, own_weights: bool) -> Starts:
+    def some(part: _Data) -> Starts:
+        return scan(task, *_arranged(task, part, own_weights), _STARTS)
+
+    return _abreast(some, data)
 
 
 @_compiled
@@ -197,31 +224,29 @@ def _begun(task: Task, u: Array, x: Array) -> State:
 
 @_compiled
 def _gone_on(
-    task: Task, data: _Data, texels: Array, state: State, own_weights: bool, until: Array
+    task: Task, data: _Data, state: State, own_weights: bool, until: Array
 ) -> State:
-    def some(part: tuple[Array, State]) -> State:
-        heavy, values = _of(task, data, part[0], own_weights)
-        one = functools.partial(descend, task, until=until)
-        if own_weights:
-            return jax.vmap(one)(heavy, values, part[1])
-        return jax.vmap(functools.partial(one, heavy[0]))(values, part[1])
-
-    return _abreast(some, (texels, state))
+    one = functools.partial(descend, task, until=until)
+    return _each(one, task, data, own_weights, state)
 
 
 @_compiled
 def _finished(
-    task: Task, data: _Data, used: Array, texels: Array, state: State, own_weights: bool
+    task: Task, data: _Data, state: State, used: Array, own_weights: bool
 ) -> Outcome:
-    def some(part: tuple[Array, State]) -> Outcome:
-        texels, state = part
-        heavy, values = _of(task, data, texels, own_weights)
-        one = functools.partial(outcome, task)
-        if own_weights:
-            return jax.vmap(one)(heavy, values, state, used[texels])
-        return jax.vmap(functools.partial(one, heavy[0]))(values, state, used[texels])
+    return _each(functools.partial(outcome, task), task, data, own_weights, state, used)
 
-    return _abreast(some, (texels, state))
+
+def _each(function: Any, task: Task, data: _Data, own_weights: bool, *others: Any) -> Any:
+    """``function(heavy, values, *others)`` of every texel."""
+
+    def some(part: tuple) -> Any:
+        heavy, values = _arranged(task, part[0], own_weights)
+        if own_weights:
+            return jax.vmap(function)(heavy, values, *part[1:])
+        return jax.vmap(functools.partial(function, heavy[0]))(values, *part[1:])
+
+    return _abreast(some, (data, *others))
 
 
 def _abreast(function: Any, arrays: Any) -> Any:

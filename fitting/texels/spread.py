@@ -79,7 +79,7 @@ def spread(
             own[c][i] - small.dot([responses[q][i][c] for q in range(k)], moved)
             for i in range(m)
         ]
-    *sums, cost = add_up([*(v * v for v in influence), sum(squares)])
+    *sums, cost = add_up([*(v * v for v in influence), sum(squares[1:], squares[0])])
     found = jnp.sqrt(jnp.stack(sums)) if sums else jnp.zeros(0)
     of_x = found[k:].reshape(channels, m)
     return Spread(found[:k], jnp.where(free, of_x, jnp.nan), cost)

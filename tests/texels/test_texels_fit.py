@@ -1,0 +1,259 @@
+"""`fit_many` against the truth, against `fitting.fit`, and against itself elsewhere."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import haste
+import jax
+import numpy as np
+import pytest
+import texel_samples
+from scipy.optimize import least_squares
+
+from data_formats import Channel, Measurement, MeasurementError
+from fitting import Model, ModelError, fit, from_angles
+from fitting.texels import TexelFits, fit_many
+from fitting.texels.many import BATCH
+
+ANGLES = texel_samples.directions()
+MODEL = "lambert + ggx"
+
+
+@pytest.fixture(scope="module")
+def sample() -> np.ndarray:
+    clean = texel_samples.values_of(MODEL, texel_samples.truth(40), ANGLES)
+    return texel_samples.noisy(clean)
+
+
+def measurement(values: np.ndarray, sigma: np.ndarray | None = None) -> Measurement:
+    known = np.isfinite(values)
+    return Measurement(
+        *ANGLES,
+        value=np.where(known, values, 0.0),
+        valid=known,
+        channels=tuple(Channel(f"{k}") for k in range(values.shape[1])),
+        sigma=sigma,
+    )
+
+
+def one_by_one(values: np.ndarray, model: str, sigma: np.ndarray | None = None, **settings):
+    """What `fitting.fit` finds for a texel."""
+    plain = {"energy": 0.0, "reciprocity": 0.0, "cross_validate": False}
+    return fit(measurement(values, sigma), model, **plain, **settings)
+
+
+def assert_same_fit(many: TexelFits, t: int, single) -> None:
+    cost = float(many.cost[t])
+    assert cost <= single.solver.cost * (1 + 1e-6)
+    assert single.solver.cost <= cost * (1 + 1e-6)
+    for p in single.parameters:
+        found, error = many.parameters[p.name][t], many.uncertainties[p.name][t]
+        value, known = (
+            np.squeeze(p.value),
+            np.squeeze(np.array(p.standard_uncertainty, float)),
+        )
+        loose = np.where(np.isfinite(known), known, np.abs(value))
+        assert np.all(np.abs(np.squeeze(found) - value) <= 0.01 * loose + 1e-9), p.name
+        both = np.isfinite(known) & np.isfinite(error)
+        np.testing.assert_allclose(
+            np.where(both, error, 1.0), np.where(both, known, 1.0), rtol=0.01
+        )
+
+
+def test_parameters_are_recovered_without_noise():
+    truth = texel_samples.truth(50, seed=3)
+    found = fit_many(texel_samples.values_of(MODEL, truth, ANGLES), ANGLES, MODEL)
+    assert found.converged.all()
+    for name, value in truth.items():
+        np.testing.assert_allclose(found.parameters[name], value, rtol=1e-5)
+    assert found.cost.max() < 1e-12
+    assert (found.used == 60 * 3).all()
+
+
+def test_the_fit_of_a_texel_is_that_of_fit(sample):
+    found = fit_many(sample, ANGLES, MODEL)
+    for t in (0, 7):
+        assert_same_fit(found, t, one_by_one(sample[t], MODEL, objective="l2cos"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("model", "settings"),
+    [
+        ("eon + ggx", {"objective": "l2cos"}),
+        ("lambert + ggx(aniso)", {"objective": "l2"}),
+        ("ggx", {"objective": "l2", "tie": {"ggx.f0": "0.04*ggx.f90"}}),
+        (MODEL, {"objective": "l2cos", "bounds": {"lambert.albedo": (0.2, 0.3)}}),
+        (MODEL, {"objective": "l2cos", "fix": {"ggx.alpha": 0.2}}),
+    ],
+)
+def test_other_models_and_settings_agree_with_fit(sample, model, settings):
+    found = fit_many(sample, ANGLES, model, **settings)
+    assert found.converged.all()
+    for t in (0, 5, 11):
+        single = one_by_one(sample[t], model, **settings)
+        assert found.cost[t] <= single.solver.cost * (1 + 1e-6)
+
+
+def test_scipy_finds_nothing_better(sample):
+    """Of texels and starts drawn at random."""
+    found = fit_many(sample, ANGLES, MODEL, objective="l2")
+
+    model, geometry = Model(MODEL), from_angles(*ANGLES)
+
+    @jax.jit
+    def residual(z: jax.Array, y: jax.Array) -> jax.Array:
+        kd, f0, f90 = z[1:].reshape(3, 3)
+        names = ("ggx.alpha", "lambert.albedo", "ggx.f0", "ggx.f90")
+        return (
+            model(dict(zip(names, (z[0], kd, f0, f90), strict=True)), geometry) - y
+        ).ravel()
+
+    rng = np.random.default_rng(5)
+    low = np.concatenate([[1e-4], np.zeros(9)])
+    high = np.concatenate([[1.5], np.full(9, np.inf)])
+    for t in rng.choice(40, 5, replace=False):
+        start = np.concatenate([[rng.uniform(0.1, 0.3)], np.repeat([0.3, 0.1, 1.0], 3)])
+        with jax.enable_x64(True):
+            end = least_squares(
+                lambda z, y: np.asarray(residual(z, y)), start, args=(sample[t],),
+                bounds=(low, high), x_scale="jac",
+            )  # fmt: skip
+        assert found.cost[t] <= 2 * end.cost * (1 + 1e-6)
+
+
+def test_unknown_values_are_left_out(sample):
+    values = sample.copy()
+    values[3, 5:20, 1] = np.nan
+    values[9, ::7] = np.inf
+    found = fit_many(values, ANGLES, MODEL, objective="l2")
+    assert found.used[3] == 180 - 15
+    assert found.used[9] == 180 - 27
+    for t in (3, 9):
+        assert_same_fit(found, t, one_by_one(values[t], MODEL, objective="l2"))
+    known = np.isfinite(values)
+    masked = fit_many(sample, ANGLES, MODEL, valid=known, objective="l2")
+    np.testing.assert_array_equal(masked.cost, found.cost)
+
+
+def test_texels_with_too_few_values_say_so(sample):
+    values = sample.copy()
+    values[0] = np.nan
+    values[1, 2:] = np.nan
+    values[2, :, 0] = np.nan
+    found = fit_many(values, ANGLES, MODEL)
+    assert not found.converged[:3].any()
+    assert found.converged[3:].all()
+    for v in (*found.parameters.values(), *found.uncertainties.values()):
+        assert np.isnan(v[:3]).all()
+    assert found.used[:3].tolist() == [0, 6, 120]
+
+
+def test_known_uncertainties_count(sample):
+    sigma = 0.02 * np.abs(sample) + 1e-3
+    found = fit_many(sample, ANGLES, MODEL, sigma=sigma, objective="chi2")
+    single = one_by_one(sample[4], MODEL, sigma[4], objective="chi2")
+    assert_same_fit(found, 4, single)
+
+
+def test_coefficients_are_never_negative():
+    """Data that a negative albedo would explain better."""
+    clean = texel_samples.values_of(MODEL, texel_samples.truth(30, seed=2), ANGLES)
+    found = fit_many(clean - 0.2, ANGLES, MODEL)
+    assert found.converged.all()
+    assert min(found.parameters[n].min() for n in ("lambert.albedo", "ggx.f0")) == 0.0
+    held = found.parameters["lambert.albedo"] == 0
+    assert held.any()
+    assert np.isnan(found.uncertainties["lambert.albedo"][held]).all()
+    single = one_by_one(clean[2] - 0.2, MODEL, objective="l2cos")
+    assert found.cost[2] == pytest.approx(single.solver.cost, rel=1e-6)
+
+
+def test_fixed_and_tied_parameters_stay(sample):
+    found = fit_many(
+        sample, ANGLES, MODEL, fix={"ggx.f90": 1.0}, tie={"ggx.f0": "0.5*lambert.albedo"}
+    )
+    assert (found.parameters["ggx.f90"] == 1.0).all()
+    assert np.isnan(found.uncertainties["ggx.f90"]).all()
+    np.testing.assert_array_equal(
+        found.parameters["ggx.f0"], 0.5 * found.parameters["lambert.albedo"]
+    )
+
+
+@pytest.fixture(
+    params=[True, pytest.param(False, marks=pytest.mark.slow)],
+    ids=["in haste", "as users do"],
+)
+def compiled(request: pytest.FixtureRequest):
+    """Users have vectorised code, in which a texel's place could matter."""
+    if request.param:
+        yield
+        return
+    jax.clear_caches()
+    with haste.compiling(in_haste=False):
+        yield
+    jax.clear_caches()
+
+
+def test_neighbours_do_not_matter(compiled):
+    """Bit for bit: in another order, without half of them, alone, with broken ones."""
+    texels = 2 * BATCH + 100
+    clean = texel_samples.values_of(MODEL, texel_samples.truth(texels), ANGLES)
+    values = texel_samples.noisy(clean, 0.03)
+    values[5::13, 8, 1] = np.nan
+    all_of_them = fit_many(values, ANGLES, MODEL)
+    order = np.random.default_rng(0).permutation(texels)
+    broken = values.copy()
+    broken[1::2, 2:] = np.nan
+    for part, index in (
+        (values[order], order),
+        (values[::2], np.arange(0, texels, 2)),
+        (values[700:701], np.array([700])),
+    ):
+        assert_bits(fit_many(part, ANGLES, MODEL), all_of_them, index)
+    beside = fit_many(broken, ANGLES, MODEL)
+    assert not beside.converged[1::2].any()
+    for name, v in beside.parameters.items():
+        np.testing.assert_array_equal(v[::2], all_of_them.parameters[name][::2])
+
+
+def assert_bits(part: TexelFits, whole: TexelFits, index: np.ndarray) -> None:
+    for f in dataclasses.fields(TexelFits):
+        ours, theirs = getattr(part, f.name), getattr(whole, f.name)
+        if not isinstance(ours, dict):
+            ours, theirs = {f.name: ours}, {f.name: theirs}
+        for name in ours:
+            np.testing.assert_array_equal(ours[name], theirs[name][index], err_msg=name)
+
+
+def test_two_axes_of_texels_and_any_number_type(sample):
+    square = fit_many(sample.reshape(8, 5, 60, 3).astype(np.float32), ANGLES, MODEL)
+    assert square.cost.shape == (8, 5)
+    assert square.parameters["ggx.f0"].shape == (8, 5, 3)
+    plain = fit_many(sample, ANGLES, MODEL)
+    np.testing.assert_allclose(
+        square.parameters["ggx.alpha"].ravel(), plain.parameters["ggx.alpha"], rtol=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"values": np.ones((4, 60))}, MeasurementError, "expected (t, n, c)"),
+        ({"values": np.ones((4, 61, 3))}, MeasurementError, "each (61,)"),
+        ({"values": np.full((4, 60, 3), "x")}, MeasurementError, "expected numbers"),
+        ({"valid": np.ones((4, 60))}, MeasurementError, "valid has the shape (4, 60)"),
+        ({"objective": "log1p"}, ModelError, "l2cos, chi2, l2"),
+        ({"objective": "chi2"}, ModelError, "chi2 and sigma go together"),
+        ({"energy": 1.0}, ModelError, "without energy"),
+        ({"robust": True}, ModelError, "without robust"),
+        ({"colour": True}, ModelError, "no option colour"),
+        ({"model": "lambert + gxx"}, ModelError, "did you mean 'ggx'"),
+    ],
+)
+def test_bad_input_is_refused_in_words(change, error, words):
+    given = {"values": np.ones((4, 60, 3)), "directions": ANGLES, "model": MODEL} | change
+    with pytest.raises(error) as caught:
+        fit_many(**given)
+    assert words in str(caught.value)
