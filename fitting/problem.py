@@ -104,10 +104,6 @@ def prepare(
     weight = terms.weight if row_weights is None else terms.weight * row_weights
     n_channels, n = terms.target.shape
     size = bucket(n)
-    slope = objectives.slope(objective, terms.value * terms.kappa) * terms.kappa
-    linear_weight = weight * slope
-    if OBJECTIVES[objective].linear:
-        linear_weight = weight * terms.kappa
 
     def pad(a: np.ndarray, fill: float = 0.0) -> jax.Array:
         width = [(0, 0)] * (a.ndim - 1) + [(0, size - n)]
@@ -119,6 +115,14 @@ def prepare(
         lambda a, z: pad(np.asarray(a), float(np.asarray(z))), rows.geometry, normal
     )
     angles, angle_rows = _polar_angles(rows.geometry, size, model)
+    target, padded_weight = pad(terms.target), pad(weight)
+    if not OBJECTIVES[objective].linear:
+        slope = objectives.slope(objective, terms.value * terms.kappa) * terms.kappa
+        linear_target, linear_weight = pad(terms.value), pad(weight * slope)
+    elif np.all(terms.kappa == 1.0):
+        linear_target, linear_weight = target, padded_weight
+    else:
+        linear_target, linear_weight = pad(terms.value), pad(weight * terms.kappa)
     scale = float(np.sum((weight * terms.target) ** 2))
     energy = 0.0 if options.energy == "hard" else float(options.energy)
     return Problem(
@@ -132,10 +136,10 @@ def prepare(
         angles=angles,
         angle_rows=angle_rows,
         kappa=pad(terms.kappa, 1.0),
-        weight=pad(weight),
-        target=pad(terms.target),
-        linear_target=pad(terms.value),
-        linear_weight=pad(linear_weight),
+        weight=padded_weight,
+        target=target,
+        linear_target=linear_target,
+        linear_weight=linear_weight,
         robust_width=_float64(robust_width),
         energy_weight=_float64(energy * scale / n_channels),
         reciprocity_weight=_float64(options.reciprocity * scale / n_channels),

@@ -27,7 +27,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitting import objectives, qp
-from fitting.geometry import PolarAngles
+from fitting.geometry import Geometry, PolarAngles
 
 if TYPE_CHECKING:
     from fitting.reduced import Problem
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 # NaN and infinities still propagate.
 FAST = {"xla_cpu_enable_fast_math": True}
 _MOST_CHANNELS, _MOST_SHARED, _MOST_SUMS = 4, 8, 160
+_MOST_BLOCKS = 8
 # Operations on a row, in all the times that features are evaluated.
 _LIGHT = 2000
 # What cannot be inlined into a loop over rows, or had better not be.
@@ -94,9 +95,9 @@ def over_rows(problem: Problem, u: Array, a: Array) -> Sums:
         problem, geometry=geometry, kappa=kappa, weight=weight, target=target
     )
     listed = _listed_features(problem, u)
-    if listed is not None:
-        return _fused(problem, listed, a)
-    return _in_blocks(problem, u, a)
+    if listed is None:
+        return _in_blocks(problem, u, a)
+    return _fused(problem, listed, a)
 
 
 def of_functions(
@@ -206,8 +207,10 @@ def _per_shape(
     return of(unknowns.shape_constant[:, 0])
 
 
-def _listed_features(problem: Problem, u: Array) -> Callable[[], list[Array]] | None:
-    """A function that writes out the features of all rows, one by one, if that is cheap:
+def _listed_features(
+    problem: Problem, u: Array
+) -> Callable[[Geometry], list[Array]] | None:
+    """A function that lists the features of the rows that are fused, if that is cheap:
     elementwise operations, and few sums to be made of them."""
     unknowns = problem.unknowns
     if unknowns.spectral or problem.angles is not None:
@@ -224,12 +227,13 @@ def _listed_features(problem: Problem, u: Array) -> Callable[[], list[Array]] | 
 
         return _with_tangents(problem, functions, u)
 
-    closed = jax.make_jaxpr(features)(u, constant, problem.geometry)
-    names = list(_operations(closed.jaxpr, problem.kappa.size))
+    n = problem.kappa.size if times == 1 else _blocks_at_once(problem) * problem.chunk
+    some = jax.tree.map(lambda v: jax.ShapeDtypeStruct((n,), v.dtype), problem.geometry)
+    closed = jax.make_jaxpr(features)(u, constant, some)
+    names = list(_operations(closed.jaxpr, n))
     if len(names) * times > _LIGHT or _HEAVY.intersection(names):
         return None
-    arguments = jax.tree.leaves((u, constant, problem.geometry))
-    return lambda: jex.jaxpr_as_fun(closed)(*arguments)
+    return lambda g: jex.jaxpr_as_fun(closed)(*jax.tree.leaves((u, constant, g)))
 
 
 def _operations(jaxpr: jex.Jaxpr, n_rows: int) -> Iterator[str]:
@@ -300,6 +304,12 @@ def _channels_at_once(problem: Problem) -> int:
     return min(n_channels, most, (_MOST_SUMS - common) // each)
 
 
+def _blocks_at_once(problem: Problem) -> int:
+    """Of blocks of rows: the largest part of all of them that is not more than a few."""
+    blocks = problem.kappa.size // problem.chunk
+    return max(k for k in range(1, _MOST_BLOCKS + 1) if blocks % k == 0)
+
+
 def _n_features(problem: Problem) -> int:
     model = problem.model
     basis = sum(model.n_basis(i) for i in range(len(model.lobes)))
@@ -311,57 +321,78 @@ def _sums_per_channel(n_features: int, *, shared: bool) -> int:
     return products + n_features + 1
 
 
-def _fused(problem: Problem, listed: Callable[[], list[Array]], a: Array) -> Sums:
-    """All sums as one reduction over the rows, for a few channels at a time."""
-    *_, data = _rows(problem)
-    n_channels = data.target.shape[0]
-    shared = _slope_is_shared(problem)
-    n_features = _n_features(problem)
-    each = _sums_per_channel(n_features, shared=shared)
+def _fused(problem: Problem, listed: Callable[[Geometry], list[Array]], a: Array) -> Sums:
+    """All sums as one reduction over the rows, for a few channels at a time.
+
+    Where that is more than once, it is done for a block of rows after the other: what the
+    compiler writes of features once for all channels then stays in the cache.
+    """
+    n_channels = a.shape[0]
     size = _channels_at_once(problem)
-    upper = _pairs(n_features)
-
-    def block(first: Array | int) -> tuple[Array, Array]:
-        """Sums of the channels from ``first`` on, ``(size, each)``, and shared ones."""
-
-        def own(v: Array) -> Array:
-            if v.shape[0] == 1:
-                return v
-            return jax.lax.dynamic_slice_in_dim(v, first, size, axis=0)
-
-        features, some = listed(), _Data(data.kappa, *(own(v) for v in data[1:]))
-        amplitudes = own(a)
-
-        def products(slope: Array) -> list[Array]:
-            steep = [slope * f for f in features]
-            return [steep[i] * steep[j] for i, j in zip(*upper, strict=True)]
-
-        summed: list[Array] = []
-        for c in range(size):
-            f = sum(amplitudes[c, j] * features[j] for j in range(a.shape[1]))
-            here = _Data(some.kappa, *(v[min(c, v.shape[0] - 1)] for v in some[1:]))
-            r, d = _residual(problem, jnp.asarray(f), here)
-            if c == 0 or not shared:
-                summed += products(d)
-            summed += [(d * r) * f for f in features] + [r * r]
-        sums = jnp.stack(_add_up(summed))
-        common = len(summed) - size * each
-        return sums[common:].reshape(size, each), sums[:common]
-
     count = math.ceil(n_channels / size)
+    # The last channels overlap those before: no copy of the data to fill them up.
+    begin = np.minimum(np.arange(count) * size, n_channels - size)
+
+    def of_rows(rows) -> tuple[Array, Array]:
+        geometry, data = _located(problem, rows)
+
+        def some(first: Array | int) -> tuple[Array, Array]:
+            def own(v: Array) -> Array:
+                if v.shape[0] == 1:
+                    return v
+                return jax.lax.dynamic_slice_in_dim(v, first, size, axis=0)
+
+            own_data = _Data(data.kappa, own(data.weight), own(data.target))
+            return _sums_of_some(problem, listed(geometry), own_data, own(a))
+
+        if count == 1:
+            by_channel, common = some(0)
+            return by_channel[None], common[None]
+        return jax.lax.scan(lambda _, first: (None, some(first)), None, jnp.asarray(begin))[
+            1
+        ]
+
+    rows = _rows(problem)
     if count == 1:
-        by_channel, common = block(0)
+        blocks, commons = of_rows(rows)
     else:
-        # The last block overlaps the one before: no copy of the data to fill it up.
-        begin = np.minimum(np.arange(count) * size, n_channels - size)
-        _, (blocks, commons) = jax.lax.scan(lambda _, i: (None, block(i)), None, begin)
-        c = np.arange(n_channels)
-        which = np.minimum(c // size, count - 1)
-        by_channel = blocks[which, c - begin[which]]
-        common = commons[0]
+        at_once = _blocks_at_once(problem)
+        blocks, commons = _sum_blocks(problem, rows, of_rows, at_once)
+    c = np.arange(n_channels)
+    which = np.minimum(c // size, count - 1)
+    by_channel, common = blocks[which, c - begin[which]], commons[0]
+    n_features = _n_features(problem)
+    upper = _pairs(n_features)
+    shared = _slope_is_shared(problem)
     half = common[None] if shared else by_channel[:, : len(upper[0])]
     gradient = by_channel[:, -n_features - 1 : -1]
     return Sums(_symmetric(half, upper), gradient, jnp.sum(by_channel[:, -1]))
+
+
+def _sums_of_some(
+    problem: Problem, features: list[Array], data: _Data, a: Array
+) -> tuple[Array, Array]:
+    """Sums of a few channels ``(c, each)``, and those that all of them share."""
+    shared = _slope_is_shared(problem)
+    upper = _pairs(len(features))
+
+    def products(slope: Array) -> list[Array]:
+        steep = [slope * f for f in features]
+        return [steep[i] * steep[j] for i, j in zip(*upper, strict=True)]
+
+    terms: list[Array] = []
+    for c in range(a.shape[0]):
+        f = sum(a[c, j] * features[j] for j in range(a.shape[1]))
+        weight = data.weight[min(c, data.weight.shape[0] - 1)]
+        here = _Data(data.kappa, weight, data.target[c])
+        r, d = _residual(problem, jnp.asarray(f), here)
+        if c == 0 or not shared:
+            terms += products(d)
+        terms += [(d * r) * f for f in features] + [r * r]
+    each = _sums_per_channel(len(features), shared=shared)
+    sums = jnp.stack(_add_up(terms))
+    common = len(terms) - a.shape[0] * each
+    return sums[common:].reshape(a.shape[0], each), sums[:common]
 
 
 def _add_up(terms: Sequence[Array]) -> tuple[Array, ...]:
@@ -421,22 +452,25 @@ def _in_blocks(problem: Problem, u: Array, a: Array) -> Sums:
     return _sum_blocks(problem, _rows(problem), block)
 
 
-def _sum_blocks(problem: Problem, rows: tuple, block: Callable):
-    """Sum of ``block(rows)`` over blocks of rows: memory does not grow with them."""
-    blocks = problem.kappa.shape[0] // problem.chunk
+def _sum_blocks(problem: Problem, rows: tuple, block: Callable, times: int = 1):
+    """Sum of ``block(rows)`` over blocks of rows: memory does not grow with them.
+
+    A block has ``times`` the rows that are usual.
+    """
+    size = times * problem.chunk
+    blocks = problem.kappa.shape[0] // size
     if blocks == 1:
         return block(rows)
 
-    def split(v: Array) -> Array:
-        parts = v.reshape(*v.shape[:-1], blocks, problem.chunk)
-        return jnp.moveaxis(parts, -2, 0)
+    def part(i: Array | int):
+        return jax.tree.map(
+            lambda v: jax.lax.dynamic_slice_in_dim(v, i * size, size, -1), rows
+        )
 
-    def add(carry, part):
-        return jax.tree.map(jnp.add, carry, block(part)), None
+    def add(carry, i: Array):
+        return jax.tree.map(jnp.add, carry, block(part(i))), None
 
-    parts = jax.tree.map(split, rows)
     zero = jax.tree.map(
-        lambda s: jnp.zeros(s.shape, s.dtype),
-        jax.eval_shape(block, jax.tree.map(lambda v: v[0], parts)),
+        lambda s: jnp.zeros(s.shape, s.dtype), jax.eval_shape(lambda: block(part(0)))
     )
-    return jax.lax.scan(add, zero, parts)[0]
+    return jax.lax.scan(add, zero, jnp.arange(blocks))[0]
