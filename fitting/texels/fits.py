@@ -65,6 +65,7 @@ def fit_many(
     sigma: Any = None,
     valid: Any = None,
     progress: Callable[[int], None] | None = None,
+    single_first: bool = False,
     **settings: Any,
 ) -> TexelFits:
     """Fit a model to every texel of a sample, all measured in the same directions.
@@ -75,6 +76,8 @@ def fit_many(
     ``sigma``, standard uncertainties for ``chi2``, has the shape of the values.
     ``settings`` are fields of `FitOptions`; the objective is ``l2cos``, ``l2`` or ``chi2``,
     and there is no penalty on the albedo. ``progress`` is called with texels done.
+    ``single_first``: float32 as far as it goes and then float64, for GPUs that are slow at
+    the latter.
 
     Every texel's result is the same, bit for bit, whatever its neighbours are. Raises
     `MeasurementError` for arrays that do not fit together and `ModelError` for a senseless
@@ -95,7 +98,7 @@ def fit_many(
                 None if v is None else np.asarray(v[here]).reshape(-1, n, channels)
                 for v in (values, sigma, valid)
             ]
-            parts.append(fit_block(task, *block))  # pyright: ignore
+            parts.append(fit_block(task, *block, single_first=single_first))  # pyright: ignore
             if progress is not None:
                 progress(min(first + lines, leading[0]) * math.prod(leading[1:]))
     whole = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
@@ -111,12 +114,17 @@ def lines_per_chunk(shape: tuple[int, ...]) -> int:
 
 
 def fit_block(
-    task: Task, values: np.ndarray, sigma: np.ndarray | None, valid: np.ndarray | None
+    task: Task,
+    values: np.ndarray,
+    sigma: np.ndarray | None,
+    valid: np.ndarray | None,
+    *,
+    single_first: bool = False,
 ) -> dict[str, np.ndarray]:
     """`fit_chunk` of values ``(t, n, c)`` that count where ``valid`` is not 0."""
     if valid is not None:
         values = np.where(valid != 0, values, np.nan)
-    return fit_chunk(task, values, sigma)
+    return fit_chunk(task, values, sigma, single_first=single_first)
 
 
 def named(

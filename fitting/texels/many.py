@@ -50,13 +50,25 @@ class _Data(NamedTuple):
     sigma: np.ndarray | None
 
 
+class _How(NamedTuple):
+    """Whether texels have weights of their own, and whether float32 comes first."""
+
+    own_weights: bool
+    single_first: bool
+
+
 def fit_chunk(
-    task: Task, values: np.ndarray, sigma: np.ndarray | None = None
+    task: Task,
+    values: np.ndarray,
+    sigma: np.ndarray | None = None,
+    *,
+    single_first: bool = False,
 ) -> dict[str, np.ndarray]:
     """The fields of `Outcome`, and ``runner_up (t,)``, of texels.
 
     ``values (t, n, c)`` have all rows of the file, NaN where unknown; so has ``sigma``.
-    Call with x64 enabled.
+    ``single_first``: descend in float32 and then on in float64, for GPUs that are slow at
+    the latter. Call with x64 enabled.
     """
     data = _Data(values, sigma)
     used = _in_batches(lambda some: _counted(task, some), data)
@@ -66,7 +78,8 @@ def fit_chunk(
     for own_weights in (False, True):
         texels = np.flatnonzero(alike != own_weights)
         if texels.size:
-            part = _fit(task, _taken(data, texels), own_weights, used[texels])
+            how = _How(own_weights, single_first)
+            part = _fit(task, _taken(data, texels), how, used[texels])
             for name, v in part.items():
                 whole = out.setdefault(
                     name, np.zeros((used.shape[0], *v.shape[1:]), v.dtype)
@@ -75,21 +88,19 @@ def fit_chunk(
     return out
 
 
-def _fit(
-    task: Task, data: _Data, own_weights: bool, used: np.ndarray
-) -> dict[str, np.ndarray]:
+def _fit(task: Task, data: _Data, how: _How, used: np.ndarray) -> dict[str, np.ndarray]:
     """Texels whose weights are their own, or those of all."""
-    starts = _in_batches(lambda some: _scanned(task, some, own_weights), data)
+    starts = _in_batches(lambda some: _scanned(task, some, how.own_weights), data)
     # A second start is refined only where it may lead to something better.
     second = np.flatnonzero(starts.cost[:, 1] < _FAR_COSTLIER * starts.cost[:, 0])
-    state = _refined(task, data, own_weights, starts.u[:, 0], starts.x[:, 0])
+    state = _refined(task, data, how, starts.u[:, 0], starts.x[:, 0])
     best = np.where(np.isfinite(state.blocks.cost), state.blocks.cost, np.inf)
     ratio = np.full(best.size, np.nan)
     if second.size:
         other = _refined(
             task,
             _taken(data, second),
-            own_weights,
+            how,
             starts.u[second, 1],
             starts.x[second, 1],
         )
@@ -100,36 +111,52 @@ def _fit(
         apart = np.isfinite(high) & (high > low * (1.0 + _SAME_MINIMUM)) & (low > 0)
         ratio[second[apart]] = high[apart] / low[apart]
     found = _in_batches(
-        lambda some, s, n: _finished(task, some, s, n, own_weights), data, state, used
+        lambda some, s, n: _finished(task, some, s, n, how.own_weights), data, state, used
     )
     return {**found._asdict(), "runner_up": ratio}
 
 
-def _refined(
-    task: Task, data: _Data, own_weights: bool, u: np.ndarray, x: np.ndarray
-) -> State:
+def _refined(task: Task, data: _Data, how: _How, u: np.ndarray, x: np.ndarray) -> State:
     """The ends of descents from ``u (t, k)`` and ``x (t, c, m)``.
 
     Once more from inside where a shape ended on the flat part of its support's map.
     """
-    state = _descended(task, data, own_weights, u, x)
+    state = _descended(task, data, how, u, x)
     periodic = np.array([s == "periodic" for s in task.problem.unknowns.scales], dtype=bool)
     stuck = (np.abs(state.u) > _FLAT) & ~periodic
     again = np.flatnonzero(stuck.any(axis=1))
     if again.size:
         u = np.where(stuck, np.sign(state.u) * _INSIDE, state.u)[again]
         some = _taken(data, again)
-        new = _descended(task, some, own_weights, u, state.blocks.x[again])
+        new = _descended(task, some, how, u, state.blocks.x[again])
         _replaced(state, again, new, new.blocks.cost < state.blocks.cost[again])
     return state
 
 
-def _descended(
-    task: Task, data: _Data, own_weights: bool, u: np.ndarray, x: np.ndarray
+def _descended(task: Task, data: _Data, how: _How, u: Any, x: Any) -> State:
+    """The ends of descents from ``u (t, k)`` and ``x (t, c, m)``."""
+    if how.single_first:
+        # A few steps, since rounding would hide the end.
+        rough = _in_precision(
+            task, data, how.own_weights, u, x, kind=jnp.float32, most=_FEW_STEPS
+        )
+        usable = np.isfinite(rough.blocks.cost)
+        u = np.where(usable[:, None], rough.u, u)
+        x = np.where(usable[:, None, None], rough.blocks.x, x)
+    return _in_precision(
+        task, data, how.own_weights, u, x, kind=jnp.float64, most=_MAX_STEPS
+    )
+
+
+def _in_precision(
+    task: Task, data: _Data, own_weights: bool, u: Any, x: Any, *, kind: Any, most: int
 ) -> State:
+    """Descents in one precision, of as many steps at most."""
+    u, x = np.asarray(u, kind), np.asarray(x, kind)
+    task = jax.tree.map(lambda v: v.astype(kind) if _is_real(v) else v, task)
     state = _in_batches(lambda u, x: _begun(task, u, x), u, x)
     waiting = np.arange(u.shape[0])
-    for until in range(_FEW_STEPS, _MAX_STEPS + 1, _FEW_STEPS):
+    for until in range(_FEW_STEPS, most + 1, _FEW_STEPS):
         limit = jnp.asarray(until)
         part = _in_batches(
             lambda some, s, n=limit: _gone_on(task, some, s, own_weights, n),
@@ -143,11 +170,15 @@ def _descended(
     return state
 
 
+def _is_real(v: Any) -> bool:
+    return jnp.issubdtype(v.dtype, jnp.floating)
+
+
 def _taken(arrays: Any, index: np.ndarray) -> Any:
     return jax.tree.map(lambda v: v[index], arrays)
 
 
-def _replaced(state: State, index: np.ndarray, new: State, where: np.ndarray) -> None:
+def _replaced(state: State, index: np.ndarray, new: State, where: Any) -> None:
     """Put the chosen ones of new states in the places of the old ones."""
     for whole, some in zip(jax.tree.leaves(state), jax.tree.leaves(new), strict=True):
         whole[index[where]] = some[where]
@@ -254,9 +285,9 @@ def _abreast(function: Any, arrays: Any) -> Any:
     own = _ABREAST - _SPARE
 
     def split(v: Array) -> Array:
-        parts = jnp.asarray(v).reshape(-1, own, *jnp.shape(v)[1:])
+        parts = jnp.asarray(v).reshape(BATCH // own, own, *jnp.shape(v)[1:])
         spare = [(0, 0), (0, _SPARE)] + [(0, 0)] * (parts.ndim - 2)
         return jnp.pad(parts, spare, mode="edge")
 
     out = jax.lax.map(function, jax.tree.map(split, arrays))
-    return jax.tree.map(lambda v: v[:, :own].reshape(-1, *v.shape[2:]), out)
+    return jax.tree.map(lambda v: v[:, :own].reshape(BATCH, *v.shape[2:]), out)

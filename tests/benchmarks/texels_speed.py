@@ -159,7 +159,8 @@ def table(texels: int, of_scipy: int) -> tuple[list[str], dict[str, float]]:
     lines = [
         f"{texels} texels x {DIRECTIONS} x {CHANNELS}, {MODEL}, l2; of scipy the first "
         f"{of_scipy}; {len(os.sched_getaffinity(0))} cores",
-        f"  {'':34} {'us, clock':>10} {'us, CPU':>10} {'ratio':>7} {'CPU':>7} {'wrong':>12}",
+        f"  {'':34} {'us, clock':>10} {'us, CPU':>10} "
+        f"{'ratio':>7} {'CPU':>7} {'wrong':>12}",
     ]
 
     def line(name: str, t: Timed, wrong: int, of: int) -> str:

@@ -148,20 +148,13 @@ def test_what_makes_no_sense_is_refused(
     assert sorted(os.listdir()) == before
 
 
-@pytest.fixture
-def in_small_chunks(tmp_path: Path, monkeypatch) -> Path:
-    """A file whose lines of texels are a chunk each."""
-    monkeypatch.chdir(tmp_path)
-    wide = np.broadcast_to(sample(1)[:, None], (8, 9000, 60, 3)).astype(np.float32)
-    texel_samples.write(tmp_path / "wide.h5", wide, ANGLES)
-    return tmp_path
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, 2])
-def test_killed_it_goes_on_and_ends_the_same(in_small_chunks, workers):
-    folder = in_small_chunks
-    command = ("texels", "wide.h5", "-o", "out.h5", "--workers", workers)
+def test_killed_it_goes_on_and_ends_the_same(tmp_path):
+    """Begun by one process, ended by two; a line of texels is a chunk."""
+    lines, columns, folder = 8, 4100, tmp_path
+    wide = np.broadcast_to(sample(1)[:, None], (lines, columns, 60, 3)).astype(np.float32)
+    texel_samples.write(folder / "wide.h5", wide, ANGLES)
+    command = ("texels", "wide.h5", "-o", "out.h5")
     running = process(*command, cwd=folder)
     parts, end = folder / "out.h5.parts", time.monotonic() + PATIENCE_S
     while len(list(parts.glob("*.npz"))) < 2:
@@ -172,7 +165,7 @@ def test_killed_it_goes_on_and_ends_the_same(in_small_chunks, workers):
     running.communicate()
     assert not (folder / "out.h5").exists()
     before = {p.name: p.stat().st_mtime_ns for p in parts.glob("*.npz")}
-    assert 2 <= len(before) < 8
+    assert 2 <= len(before) < lines
 
     refused = process(*command, cwd=folder)
     _, err = refused.communicate(timeout=PATIENCE_S)
@@ -183,13 +176,13 @@ def test_killed_it_goes_on_and_ends_the_same(in_small_chunks, workers):
     assert other.returncode == 2
     assert "other options" in err
 
-    again = process(*command, "--resume", "--json", cwd=folder)
+    again = process(*command, "--resume", "--json", "--workers", 2, cwd=folder)
     out, err = again.communicate(timeout=PATIENCE_S)
     assert again.returncode == 0, err
-    assert json.loads(out)["fitted_now"] <= (8 - len(before)) * 9000
+    assert json.loads(out)["fitted_now"] <= (lines - len(before)) * columns
     assert not parts.exists()
     cost = arrays(folder / "out.h5")["cost"]
-    assert cost.shape == (8, 9000)
+    assert cost.shape == (lines, columns)
     # Equal texels, whichever process and run they were fitted in.
     assert np.unique(cost).size == 1
 
@@ -197,12 +190,13 @@ def test_killed_it_goes_on_and_ends_the_same(in_small_chunks, workers):
 @pytest.mark.slow
 def test_memory_does_not_grow_with_the_file(tmp_path):
     peaks = []
-    for lines in (4, 16):
+    for lines in (2, 8):
         wide = np.broadcast_to(sample(1)[:, None], (lines, 8000, 60, 3))
         texel_samples.write(tmp_path / "wide.h5", wide.astype(np.float32), ANGLES)
         program = (
             "import resource, sys; from fitting.cli import main; "
-            "code = main(sys.argv[1:]); print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss); sys.exit(code)"
+            "code = main(sys.argv[1:]); "
+            "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss); sys.exit(code)"
         )
         done = subprocess.run(
             [sys.executable, "-c", program, "texels", "wide.h5", "-o", "out.h5", "-q"],
@@ -210,5 +204,5 @@ def test_memory_does_not_grow_with_the_file(tmp_path):
             env=os.environ | haste.environment(ROOT) | {"PYTHONPATH": str(ROOT)},
         )  # fmt: skip
         peaks.append(int(done.stdout.split()[-1]) / 1024)
-    # The larger file has 69 MB more of values, 138 MB as float64.
-    assert peaks[1] < peaks[0] + 40, peaks
+    # The larger file has 35 MB more of values, 69 MB as float64.
+    assert peaks[1] < peaks[0] + 20, peaks

@@ -237,6 +237,16 @@ def test_two_axes_of_texels_and_any_number_type(sample):
     )
 
 
+@pytest.mark.slow
+def test_single_precision_first_ends_at_the_same(sample):
+    plain = fit_many(sample, ANGLES, MODEL)
+    quick = fit_many(sample, ANGLES, MODEL, single_first=True)
+    assert quick.converged.all()
+    np.testing.assert_allclose(quick.cost, plain.cost, rtol=1e-7)
+    apart = quick.parameters["ggx.alpha"] - plain.parameters["ggx.alpha"]
+    assert np.all(np.abs(apart) <= 0.01 * plain.uncertainties["ggx.alpha"])
+
+
 @pytest.mark.parametrize(
     ("change", "error", "words"),
     [
