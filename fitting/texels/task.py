@@ -171,6 +171,16 @@ def _amplitudes(
 
 def _linearised(problem: Problem, points: Array) -> tuple[Array, Array]:
     """``columns (d, m, p, n)`` and ``offset (d, p, n)`` of the model at every point."""
+    columns, offset = _at_points(problem, points)
+    alike = np.all(np.asarray(columns) == columns[:1]) and np.all(
+        np.asarray(offset) == offset[:1]
+    )
+    return (columns[:1], offset[:1]) if alike else (columns, offset)
+
+
+@eqx.filter_jit
+def _at_points(problem: Problem, points: Array) -> tuple[Array, Array]:
+    """The same of every channel, ``(c, m, p, n)`` and ``(c, p, n)``."""
     unknowns, channels = problem.unknowns, problem.target.shape[0]
     x0 = jnp.zeros((channels, unknowns.n_coefficients))
 
@@ -181,8 +191,4 @@ def _linearised(problem: Problem, points: Array) -> tuple[Array, Array]:
         return jnp.einsum("cbm,bn->cmn", da_dx, wide), a @ wide
 
     columns, offset = jax.lax.map(at, points)
-    columns, offset = jnp.moveaxis(columns, 0, 2), jnp.moveaxis(offset, 0, 1)
-    alike = np.all(np.asarray(columns) == columns[:1]) and np.all(
-        np.asarray(offset) == offset[:1]
-    )
-    return (columns[:1], offset[:1]) if alike else (columns, offset)
+    return jnp.moveaxis(columns, 0, 2), jnp.moveaxis(offset, 0, 1)
