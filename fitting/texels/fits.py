@@ -15,7 +15,8 @@ from data_formats import MeasurementError
 from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions
-from fitting.texels.many import BATCH, fit_chunk
+from fitting.texels.abreast import BATCH
+from fitting.texels.many import fit_chunk
 from fitting.texels.task import Task, make_task
 
 # Of measured values in one chunk, and the most texels: what is in memory at a time.
@@ -29,8 +30,8 @@ class TexelFits:
     """Fits of texels, arrays of their leading shape ``(t,)`` or ``(h, w)``.
 
     - ``parameters``: by name, shape parameters ``(t,)`` and coefficients ``(t, c)``.
-    - ``uncertainties``: the same, standard (k = 1), by ``s^2 (J'J)^-1`` with ``s^2`` the
-      cost per degree of freedom (1 for chi2); NaN for what is fixed or held by a bound.
+    - ``uncertainties``: the same, standard (k = 1), those of `fitting.uncertainty`; NaN
+      for what is fixed or held by a bound.
     - ``cost``: the sum of squares that was made small.
     - ``converged``, ``steps``, ``used``: whether and in how many steps, and of how many
       values.

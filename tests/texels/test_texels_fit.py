@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 from data_formats import Channel, Measurement, MeasurementError
 from fitting import Model, ModelError, fit, from_angles
 from fitting.texels import TexelFits, fit_many
-from fitting.texels.many import BATCH
+from fitting.texels.abreast import BATCH
 
 ANGLES = texel_samples.directions()
 MODEL = "lambert + ggx"
