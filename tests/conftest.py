@@ -52,14 +52,11 @@ def compiled_as_users_do(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.fixture(autouse=True, scope="module")
 def room_for_compiled_code() -> Iterator[None]:
-    """Linux grants a process 65,530 regions of memory, and every compiled function takes
-    three for good, small ones included: where they become many, the compiler aborts."""
-    import jax
+    """Tests compile more than a process can hold."""
+    from fitting.compiled_code import make_room
 
     yield
-    regions = Path("/proc/self/maps")
-    if regions.exists() and regions.read_bytes().count(b"\n") > 30_000:
-        jax.clear_caches()
+    make_room()
 
 
 @pytest.fixture(scope="session")

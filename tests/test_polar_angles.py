@@ -33,9 +33,8 @@ def test_the_table_changes_nothing(expression: str):
         plain = dataclasses.replace(problem, angles=None, angle_rows=None)
         k, m = problem.unknowns.n_shape, problem.unknowns.n_coefficients
         u, x = 0.1 * jnp.ones(k), 0.3 * jnp.ones((1, m))
-        linearised = jnp.asarray(False)
-        with_table = jax.jit(evaluate)(problem, u, x, linearised)
-        without = jax.jit(evaluate)(plain, u, x, linearised)
+        with_table = jax.jit(evaluate)(problem, u, x)
+        without = jax.jit(evaluate)(plain, u, x)
         for a, b in zip(with_table, without, strict=True):
             scale = float(np.max(np.abs(b), initial=1e-300))
             np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12 * scale)

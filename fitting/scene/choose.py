@@ -14,6 +14,7 @@ import numpy as np
 
 from data_formats import Measurement
 from fitting.by_name import own_settings
+from fitting.compiled_code import make_room
 from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions
@@ -77,6 +78,7 @@ def choose_for_scene(
     Raises `SceneError`, `ModelError`, and `MeasurementError` for data without reflection.
     """
     say = progress or (lambda _: None)
+    make_room()
     models = tuple(dict.fromkeys(Model(m).expression for m in models or LADDER))
     unable = [m for m in models if "front" not in Model(m).ways]
     if unable:
