@@ -131,13 +131,15 @@ def test_interrupted_leaves_nothing(run, monkeypatch):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_a_real_interruption(tmp_path):
-    program = "import sys; from fitting.cli import main; sys.exit(main())"
+    # What a shell runs in the background ignores interruptions, and so do its children.
+    program = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "from fitting.cli import main; sys.exit(main())"
+    )
     process = subprocess.Popen(
         [sys.executable, "-c", program, "fit", "-m", "lambert + 2*ggx"],
         stderr=subprocess.PIPE, text=True, cwd=tmp_path,
         env=os.environ | {"BRDF_CACHE_DIR": ""},
-        # What a shell runs in the background ignores interruptions, and so its children.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     assert process.stderr is not None
     for line in process.stderr:
