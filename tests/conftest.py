@@ -1,15 +1,23 @@
-"""What all tests share: compiled code, and where the measured files of others lie."""
+"""What all tests share: compiled code, a browser, and where measured files lie."""
 
 from __future__ import annotations
 
 import gc
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import haste
 import pytest
 
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "chrome")
+ARGUMENTS = (
+    "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--no-first-run",
+)  # fmt: skip
 # Where it is the rounding and the speed of the compiled code that is tested.
 OPTIMISED = ("test_combined_options.py", "test_precision.py", "benchmarks")
 
@@ -69,3 +77,21 @@ def real_data() -> Path:
     if not path.is_dir():
         pytest.skip(f"real files: BRDF_TEST_DATA={folder} is not a folder")
     return path
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A headless Chromium: of ``BRDF_CHROMIUM``, or the first that is found.
+
+    For a module, not a session: while it is open no other event loop can run.
+    """
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    found = os.environ.get("BRDF_CHROMIUM") or next(
+        filter(None, map(shutil.which, CHROMIUM)), None
+    )
+    if found is None:
+        pytest.skip(f"needs Chromium: BRDF_CHROMIUM, or one of {', '.join(CHROMIUM)}")
+    with playwright.sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=found, args=list(ARGUMENTS))
+        yield chromium
+        chromium.close()

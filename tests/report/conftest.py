@@ -1,9 +1,7 @@
-"""What the tests of reports look at: fits of the bundled sample, and a browser."""
+"""What the tests of reports look at: fits of the bundled sample."""
 
 from __future__ import annotations
 
-import importlib.util
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,13 +13,6 @@ from fitting.fitter import fit
 from fitting.report import Reported, page
 from fitting.result import FitResult
 from fitting.sample import sample_path
-
-CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "chrome")
-ARGUMENTS = (
-    "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--no-first-run",
-)  # fmt: skip
 
 
 @pytest.fixture(scope="session")
@@ -60,22 +51,6 @@ def html(kept: FitResult, other: FitResult, data: Measurement, coarse: None) -> 
         Reported(other, data, "", "b.fit.json"),
     ]
     return page(every, viewer=False)
-
-
-@pytest.fixture(scope="session")
-def browser():
-    """Chromium, without a window and without the network."""
-    program = next(filter(None, map(shutil.which, CHROMIUM)), None)
-    if program is None:
-        pytest.skip(f"browser: none of {', '.join(CHROMIUM)} is installed")
-    if importlib.util.find_spec("playwright") is None:
-        pytest.skip("browser: the Python package playwright is not installed")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=program, args=list(ARGUMENTS))
-        yield found
-        found.close()
 
 
 @pytest.fixture

@@ -1,9 +1,7 @@
-"""What the tests of the viewer look at: fits of the bundled sample, and a browser."""
+"""What the tests of the viewer look at: fits of the bundled sample."""
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,13 +12,6 @@ from data_formats import Measurement, read
 from fitting import fit
 from fitting.result import FitResult
 from fitting.sample import sample_path
-
-CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "chrome")
-ARGUMENTS = (
-    "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--no-first-run",
-)  # fmt: skip
 
 
 @pytest.fixture(scope="session")
@@ -36,21 +27,6 @@ def glossy(paint: Measurement) -> FitResult:
 @pytest.fixture(scope="session")
 def matt(paint: Measurement) -> FitResult:
     return fit(paint, "oren_nayar", starts=1)
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """A headless Chromium: of ``BRDF_CHROMIUM``, or the first that is found."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
-    found = os.environ.get("BRDF_CHROMIUM") or next(
-        filter(None, map(shutil.which, CHROMIUM)), None
-    )
-    if found is None:
-        pytest.skip(f"needs Chromium: BRDF_CHROMIUM, or one of {', '.join(CHROMIUM)}")
-    with playwright.sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=found, args=list(ARGUMENTS))
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture(scope="module")

@@ -53,6 +53,15 @@ def _shot(opened: Opened, selector: str, number: int = 0) -> np.ndarray:
     return rgba[..., :3] * rgba[..., 3:]
 
 
+def _is_drawn(opened: Opened, selector: str, number: int) -> bool:
+    """Whether there is something to see, or is soon: albedos wait until all else rests."""
+    for _ in range(100):
+        if _shot(opened, selector, number).std() > 0.02:
+            return True
+        opened.page.wait_for_timeout(100)
+    return False
+
+
 def _difference(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a - b).mean())
 
@@ -67,7 +76,7 @@ def test_draws_everything_and_asks_for_nothing(shown: Opened) -> None:
     out = shown
     for selector in PICTURES:
         for number in (0, 1):
-            assert _shot(out, selector, number).std() > 0.02, selector
+            assert _is_drawn(out, selector, number), selector
     assert out.page.locator("article").count() == 2
     assert not out.page.locator(".viewer-failed").first.is_visible()
     assert out.said == []
