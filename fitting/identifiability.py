@@ -33,6 +33,7 @@ def of_data(
     valid values of every channel, ``penalties`` the share of the penalties in the costs.
     """
     out = _missing_values(problems, counts, channels)
+    out += _few_rows(problems)
     out += _cut_off(problems)
     out += _exact(problems, ends)
     out += _reciprocity(problems, penalties)
@@ -56,6 +57,24 @@ def _missing_values(
                 f"{int(count.sum())} values for {n} free parameters: nothing is "
                 "left over to judge the errors by"
             )
+    return out
+
+
+def _few_rows(problems: list[Problem]) -> list[str]:
+    """Fewer directions than a channel has parameters, though channels may make up for it.
+
+    Error bars take rows for independent, and of so few there is no telling.
+    """
+    out: list[str] = []
+    for problem in problems:
+        rows = int(np.sum(np.any(np.asarray(problem.weight) > 0, axis=0)))
+        names = [*problem.unknowns.free_shape, *problem.unknowns.free_coefficients]
+        if problem.unknowns.n_shape and 0 < rows <= len(names):
+            sentence = (
+                f"{rows} rows for the {len(names)} parameters of a channel: "
+                f"{', '.join(names)} may be far off, and their uncertainties too small"
+            )
+            out += [sentence] if sentence not in out else []
     return out
 
 

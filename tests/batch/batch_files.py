@@ -15,7 +15,11 @@ import synthetic
 import data_formats
 
 ROOT = Path(__file__).parents[2]
-_PROGRAM = "import sys; from fitting.cli import main; sys.exit(main())"
+# What a shell runs in the background ignores interruptions, and so do its children.
+_PROGRAM = (
+    "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from fitting.cli import main; sys.exit(main())"
+)
 # Several commands in one process, separated by a line.
 _PROGRAMS = """
 import sys
