@@ -49,7 +49,7 @@ def test_one_pass_with_the_table_of_polar_angles(line, expression: str, least: f
         problem = prepare(rows, Model(expression), FitOptions(objective="l2"))
         plain = dataclasses.replace(problem, angles=None, angle_rows=None)
         k, m = problem.unknowns.n_shape, problem.unknowns.n_coefficients
-        point = jnp.zeros(k), jnp.ones((1, m)), jnp.asarray(False)
+        point = jnp.zeros(k), jnp.ones((1, m))
         compiled = jax.jit(evaluate)
 
         def time_of(p) -> float:
