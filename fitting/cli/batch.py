@@ -11,7 +11,7 @@ from cyclopts import Group, Parameter
 
 from fitting.cli import failures
 from fitting.cli.fit_choices import Choices
-from fitting.cli.flags import Flags
+from fitting.cli.flags import WORK, Flags, Scheduler
 
 if TYPE_CHECKING:
     from fitting.batch import Engine
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from fitting.cli.batch_run import Ran
     from fitting.cli.fit_settings import Job
 
-_WORK = Group("Who works", sort_key=7)
 _FILES = Group("Files", sort_key=6)
 _TERMINATED = 143
 _MOST_WORKERS = 4096
@@ -51,22 +50,15 @@ class Workers:
     workers: Annotated[
         int | None,
         Parameter(
-            group=_WORK,
+            group=WORK,
             help="Number of processes; 0: no process but this one. Without: one per core.",
         ),
     ] = None
-    scheduler: Annotated[
-        str | None,
-        Parameter(
-            group=_WORK,
-            help="A dask scheduler, tcp://HOST:PORT, whose workers see the same files, or "
-            "local for one of its own. Needs brdf-fitting[dask].",
-        ),
-    ] = None
+    scheduler: Scheduler = None
     retries: Annotated[
         int,
         Parameter(
-            group=_WORK,
+            group=WORK,
             help="How often a file is tried again whose worker died or met a storage "
             "error.",
         ),
@@ -74,7 +66,7 @@ class Workers:
     resume: Annotated[
         bool,
         Parameter(
-            negative="", show_default=False, group=_WORK,
+            negative="", show_default=False, group=WORK,
             help="Go on with what the folder holds: keep whole results of unchanged "
             "files, options and versions, redo others.",
         ),

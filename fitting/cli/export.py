@@ -173,8 +173,9 @@ def _show(report: Report, flags: Flags) -> None:
 
 def _named_after(source: Path, suffix: str) -> Path:
     """``paint.fit.json`` becomes ``paint`` and the suffix, in the working folder."""
-    name = source.name.removesuffix(".json").removesuffix(".fit")
-    return Path(name + suffix)
+    from fitting.cli.result_data import stem_of
+
+    return Path(stem_of(source) + suffix)
 
 
 def _angles(name: str, text: str | None) -> tuple[float, ...]:

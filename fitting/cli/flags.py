@@ -19,6 +19,28 @@ Reader = Annotated[
     list[str] | None,
     Parameter(negative="", help="OPTION=VALUE for the format's reader. Repeatable."),
 ]
+# What every command that shows a result beside its data takes.
+Data = Annotated[
+    list[Path] | None,
+    Parameter(
+        negative="",
+        help="The measurement, if it is not where it was for the fit, or another one to "
+        "compare with. Repeatable: files of one sample are joined.",
+    ),
+]
+DataFormat = Annotated[
+    str | None, Parameter(help="Format of --data, if it is not recognised.")
+]
+# What every command with work for many processes takes.
+WORK = Group("Who works", sort_key=7)
+Scheduler = Annotated[
+    str | None,
+    Parameter(
+        group=WORK,
+        help="A dask scheduler, tcp://HOST:PORT, whose workers see the same files, or local "
+        "for one of its own. Needs brdf-fitting[dask].",
+    ),
+]
 Json = Annotated[
     bool,
     Parameter(negative="", show_default=False, help="Everything as JSON, for programs."),

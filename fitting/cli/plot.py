@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from fitting.cli.failures import UsageError
-from fitting.cli.flags import Flags, Json, Reader
+from fitting.cli.flags import Data, DataFormat, Flags, Json, Reader
 
 if TYPE_CHECKING:
     from fitting.result import FitResult
@@ -24,14 +24,7 @@ def plot(
     *figures: Annotated[
         str, Parameter(help="Which figures; without: all that apply. See --list.")
     ],
-    data: Annotated[
-        list[Path] | None,
-        Parameter(
-            negative="",
-            help="The measurement, if it is not where it was for the fit, or another one "
-            "to compare with. Repeatable: files of one sample are joined.",
-        ),
-    ] = None,
+    data: Data = None,
     output: Annotated[
         Path | None,
         Parameter(
@@ -60,9 +53,7 @@ def plot(
         Parameter(negative="", show_default=False, help="List the figures."),
     ] = False,
     json: Json = False,
-    data_format: Annotated[
-        str | None, Parameter(help="Format of --data, if it is not recognised.")
-    ] = None,
+    data_format: DataFormat = None,
     reader: Reader = None,
     flags: Flags | None = None,
 ) -> int:

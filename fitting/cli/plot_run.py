@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,14 +11,12 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from data_formats import Measurement
-from fitting.cli import reading
 from fitting.cli.failures import UsageError
 from fitting.cli.flags import Flags
+from fitting.cli.result_data import check_data_format, check_writable, data_of, stem_of
 from fitting.cli.terminal import stderr
 from fitting.cli.work import Work
 from fitting.plots import FIGURES, FORMATS, NoFigure, draw, save
-from fitting.plots.find_data import DataNotFound, find_data, read_again
-from fitting.quantities import channel_span
 from fitting.result import FitResult
 
 if TYPE_CHECKING:
@@ -71,8 +68,7 @@ def check(asked: Asked, result: Path) -> None:
             raise UsageError(f"there is no figure {name!r}; {hint}")
     if asked.dpi is not None and not 10 <= asked.dpi <= 2400:
         raise UsageError(f"--dpi {asked.dpi:g}: expected 10 to 2400")
-    if asked.data_format is not None and not asked.data:
-        raise UsageError("--data-format is that of --data; give that, too")
+    check_data_format(asked.data_format, asked.data)
     file = _as_file(asked)
     if file is None:
         folder = asked.output or Path()
@@ -95,14 +91,13 @@ def check(asked: Asked, result: Path) -> None:
         parent = file.parent
     if not parent.is_dir():
         raise UsageError(f"{asked.output}: the folder {parent} does not exist")
-    if not os.access(parent, os.W_OK):
-        raise UsageError(f"{parent.resolve()} cannot be written to; choose another with -o")
+    check_writable(parent)
 
 
 def run(result: FitResult, path: Path, asked: Asked, flags: Flags) -> Done:
     """Draw and write. Figures that were not asked for by name may be left out."""
     _check_channels(result, asked)
-    measurement, why = _data(result, path, asked)
+    measurement, why = data_of(result, path, asked.data, asked.data_format, asked.reader)
     done = _drawn(result, measurement, why, path, asked, flags)
     if not flags.quiet:
         console = stderr()
@@ -161,27 +156,6 @@ def _check_channels(result: FitResult, asked: Asked) -> None:
             raise UsageError(f"--channel {name}: there is no such channel; {hint}")
 
 
-def _data(
-    result: FitResult, path: Path, asked: Asked
-) -> tuple[Measurement | None, str | None]:
-    """The measurement, and what is to be said about it; or None, and why."""
-    if asked.data:
-        found = reading.read_files(asked.data, asked.data_format, asked.reader)
-        theirs, ours = ([c.name for c in o.channels] for o in (found, result))
-        if theirs != ours:
-            raise UsageError(
-                f"--data {asked.data[0]}: it has {channel_span(theirs)} and the result has "
-                f"{channel_span(ours)}; they must be the same"
-            )
-        return found, read_again(result, found)
-    try:
-        found = find_data(result, path, reader=asked.reader)
-    except DataNotFound as error:
-        return None, str(error)
-    different = read_again(result, found)
-    return (None, different) if different else (found, None)
-
-
 def _as_file(asked: Asked) -> Path | None:
     """The file to write, if a file was asked for and not a folder."""
     path = asked.output
@@ -197,5 +171,4 @@ def _kind(asked: Asked) -> str:
 
 
 def _file_of(name: str, result: Path, asked: Asked) -> Path:
-    stem = result.name.removesuffix(".json").removesuffix(".fit")
-    return (asked.output or Path()) / f"{stem}.{name}.{_kind(asked)}"
+    return (asked.output or Path()) / f"{stem_of(result)}.{name}.{_kind(asked)}"

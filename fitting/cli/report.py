@@ -10,7 +10,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from fitting.cli.failures import UsageError
-from fitting.cli.flags import Flags, Json, Reader
+from fitting.cli.flags import DataFormat, Flags, Json, Reader
 
 
 def report(
@@ -42,9 +42,7 @@ def report(
         bool, Parameter(help="The surface in three dimensions, to be turned.")
     ] = True,
     json: Json = False,
-    data_format: Annotated[
-        str | None, Parameter(help="Format of --data, if it is not recognised.")
-    ] = None,
+    data_format: DataFormat = None,
     reader: Reader = None,
     flags: Flags | None = None,
 ) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,13 +10,11 @@ from typing import Any
 import msgspec
 
 from data_formats.source import replacing
-from fitting.cli import reading
 from fitting.cli.failures import UsageError
 from fitting.cli.flags import Flags
+from fitting.cli.result_data import check_data_format, check_writable, data_of, stem_of
 from fitting.cli.terminal import stderr
 from fitting.cli.work import Work
-from fitting.plots.find_data import DataNotFound, find_data, read_again
-from fitting.quantities import channel_span
 from fitting.report import Reported, page
 from fitting.report.figures import FIRST, MORE
 from fitting.result import FitResult, load_result
@@ -39,8 +36,7 @@ class Asked:
     @property
     def target(self) -> Path:
         """Where the report goes."""
-        stem = self.results[0].name.removesuffix(".json").removesuffix(".fit")
-        name = f"{stem}.report.html"
+        name = f"{stem_of(self.results[0])}.report.html"
         if self.output is None:
             return Path(name)
         return self.output / name if self.output.is_dir() else self.output
@@ -62,12 +58,8 @@ def check(asked: Asked) -> None:
         raise UsageError(f"-o {target}: expected a name that ends in .html, or a folder")
     if not target.parent.is_dir():
         raise UsageError(f"{target}: the folder {target.parent} does not exist")
-    if not os.access(target.parent, os.W_OK):
-        raise UsageError(
-            f"{target.parent.resolve()} cannot be written to; choose another with -o"
-        )
-    if asked.data_format is not None and not asked.data:
-        raise UsageError("--data-format is that of --data; give that, too")
+    check_writable(target.parent)
+    check_data_format(asked.data_format, asked.data)
     twice = [p for k, p in enumerate(asked.results) if p in asked.results[:k]]
     if twice:
         raise UsageError(f"{twice[0]}: given twice")
@@ -110,20 +102,6 @@ def run(results: Sequence[FitResult], asked: Asked, flags: Flags) -> Done:
 
 def _reported(result: FitResult, path: Path, asked: Asked, *, first: bool) -> Reported:
     """A result with its measurement, and what is to be said about that."""
-    if first and asked.data:
-        found = reading.read_files(asked.data, asked.data_format, asked.reader)
-        theirs, ours = ([c.name for c in o.channels] for o in (found, result))
-        if theirs != ours:
-            raise UsageError(
-                f"--data {asked.data[0]}: it has {channel_span(theirs)} and the result has "
-                f"{channel_span(ours)}; they must be the same"
-            )
-        return Reported(result, found, read_again(result, found) or "", path.name)
-    try:
-        found = find_data(result, path, reader=asked.reader)
-    except DataNotFound as error:
-        return Reported(result, None, str(error), path.name)
-    different = read_again(result, found)
-    if different:
-        return Reported(result, None, different, path.name)
-    return Reported(result, found, "", path.name)
+    given = asked.data if first else ()
+    found, why = data_of(result, path, given, asked.data_format, asked.reader)
+    return Reported(result, found, why or "", path.name)

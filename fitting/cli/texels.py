@@ -10,13 +10,12 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from fitting.cli import failures
-from fitting.cli.flags import Flags
+from fitting.cli.flags import WORK, Flags, Scheduler
 
 _MODEL = Group("Model", sort_key=1)
 _MADE_SMALL = Group("What is made small", sort_key=2)
 _PARAMETERS = Group("Single parameters", sort_key=4)
 _FILES = Group("Files", sort_key=6)
-_WORK = Group("Who works", sort_key=7)
 
 Objective = Literal["l2cos", "l2", "chi2"]
 Weights = Literal["solid-angle", "rows"]
@@ -85,20 +84,13 @@ class TexelWork:
     ] = None  # fmt: skip
     workers: Annotated[
         int,
-        Parameter(group=_WORK, help="Number of processes; 1: this one alone."),
+        Parameter(group=WORK, help="Number of processes; 1: this one alone."),
     ] = 1
-    scheduler: Annotated[
-        str | None,
-        Parameter(
-            group=_WORK,
-            help="A dask scheduler, tcp://HOST:PORT, whose workers see the same files, or "
-            "local for one of its own. Needs brdf-fitting[dask].",
-        ),
-    ] = None
+    scheduler: Scheduler = None
     resume: Annotated[
         bool,
         Parameter(
-            negative="", show_default=False, group=_WORK,
+            negative="", show_default=False, group=WORK,
             help="Go on with the parts that an earlier run wrote before it was ended.",
         ),
     ] = False  # fmt: skip

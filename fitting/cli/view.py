@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from fitting.cli.failures import UsageError
-from fitting.cli.flags import Flags, Reader
+from fitting.cli.flags import Data, DataFormat, Flags, Reader
 
 
 def view(
@@ -16,14 +16,7 @@ def view(
         Path,
         Parameter(help="Results of `brdf fit`, shown side by side.", show_default=False),
     ],
-    data: Annotated[
-        list[Path] | None,
-        Parameter(
-            negative="",
-            help="The measurement, if it is not where it was for the fit, or another one "
-            "to compare with. Repeatable: files of one sample are joined.",
-        ),
-    ] = None,
+    data: Data = None,
     output: Annotated[
         Path | None,
         Parameter(
@@ -36,9 +29,7 @@ def view(
         bool,
         Parameter(negative="", show_default=False, help="Open the page in a browser."),
     ] = False,
-    data_format: Annotated[
-        str | None, Parameter(help="Format of --data, if it is not recognised.")
-    ] = None,
+    data_format: DataFormat = None,
     reader: Reader = None,
     flags: Flags | None = None,
 ) -> int:
