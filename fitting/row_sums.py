@@ -348,9 +348,7 @@ def _fused(problem: Problem, listed: Callable[[Geometry], list[Array]], a: Array
         if count == 1:
             by_channel, common = some(0)
             return by_channel[None], common[None]
-        return jax.lax.scan(lambda _, first: (None, some(first)), None, jnp.asarray(begin))[
-            1
-        ]
+        return jax.lax.map(some, jnp.asarray(begin))
 
     rows = _rows(problem)
     if count == 1:
