@@ -37,8 +37,8 @@ Scheduler = Annotated[
     str | None,
     Parameter(
         group=WORK,
-        help="A dask scheduler, tcp://HOST:PORT, whose workers see the same files, or local "
-        "for one of its own. Needs brdf-fitting[dask].",
+        help="A dask scheduler, tcp://HOST:PORT, whose workers see the same files, or "
+        "local for one of its own. Needs brdf-fitting[dask].",
     ),
 ]
 Json = Annotated[
