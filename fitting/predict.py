@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from fitting.geometry import Geometry, from_angles
 from fitting.model import Model
+from fitting.padding import bucket
 
 
 def _model(expression: str) -> Model:
@@ -47,8 +48,6 @@ def predict_geometry(
     model: Model, values: Mapping[str, ArrayLike], geometry: Geometry
 ) -> np.ndarray:
     """BRDF ``(n, c)`` of a geometry. Rows are padded so that compiled code is reused."""
-    from fitting.problem import bucket
-
     shape = np.shape(geometry.cos_i)
     n = int(np.prod(shape))
     size = bucket(n)

@@ -17,12 +17,11 @@ from fitting.model import Model
 from fitting.models import Way
 from fitting.objectives import OBJECTIVES
 from fitting.options import FitOptions
+from fitting.padding import CHUNK, padded, room
 from fitting.reduced import Problem
 from fitting.rows import Rows
 from fitting.unknowns import make_unknowns
 
-_BUCKETS = (128, 256, 512, 1024, 1536, 2048, 3072, 4096)
-_CHUNK = 4096
 _RECIPROCITY_PAIRS = 256
 _SAME_ANGLE = 1e-10
 _MOST_ANGLES = 512
@@ -47,25 +46,34 @@ class Terms:
 
 def residual_terms(rows: Rows, objective: str, options: FitOptions) -> Terms:
     """``kappa (n,)``, ``weight (1 or c, n)`` and ``target (c, n)`` of an objective."""
-    spec = OBJECTIVES[objective]
+    kappa, weight = _factors(rows, objective, options)
     value = np.where(rows.valid, rows.value, 0.0).T
-    valid = rows.valid.T
-    kappa = (
-        np.abs(np.asarray(rows.geometry.cos_o)) if spec.cosine else np.ones(value.shape[1])
-    )
-    if spec.scaled:
-        size = np.median(np.abs(value * kappa)[valid])
-        kappa = kappa / (size if size > 0 else 1.0)
-    per_row = np.ones(value.shape[1])
-    if spec.solid_angle and not _is_named(options.weights, "rows"):
-        per_row = np.sqrt(rows.solid_angle)
-    weight = per_row[None] * valid
-    if spec.uses_sigma:
-        weight = weight / np.where(valid, standard_uncertainty(rows, options).T, 1.0)
-    if np.all(weight == weight[:1]):
-        weight = weight[:1]
     target = objectives.transform(objective, value * kappa)
     return Terms(kappa, weight, target, value)
+
+
+def _factors(
+    rows: Rows, objective: str, options: FitOptions
+) -> tuple[np.ndarray, np.ndarray]:
+    """``kappa (n,)`` and ``weight (1 or c, n)``: one for all channels where it can be."""
+    spec = OBJECTIVES[objective]
+    kappa = np.ones(rows.index.size)
+    if spec.cosine:
+        kappa = np.abs(rows.geometry.cos_o)
+    if spec.scaled:
+        size = np.median(np.abs(rows.value * kappa[:, None])[rows.valid])
+        kappa = kappa / (size if size > 0 else 1.0)
+    weight = np.ones((1, kappa.size))
+    if spec.solid_angle and not _is_named(options.weights, "rows"):
+        weight = np.sqrt(rows.solid_angle)[None]
+    if not rows.valid.all():
+        weight = weight * rows.valid.T
+    if spec.uses_sigma:
+        sigma = standard_uncertainty(rows, options)
+        weight = weight / np.where(rows.valid, sigma, 1.0).T
+    if len(weight) > 1 and np.all(weight == weight[:1]):
+        weight = weight[:1]
+    return kappa, weight
 
 
 def _is_named(weights: object, name: str) -> bool:
@@ -100,43 +108,41 @@ def prepare(
 ) -> Problem:
     """The padded problem. ``row_weights`` of 0 hold rows out; call with x64 enabled."""
     objective = resolve_objective(options.objective, rows.sigma is not None)
-    terms = residual_terms(rows, objective, options)
-    weight = terms.weight if row_weights is None else terms.weight * row_weights
-    n_channels, n = terms.target.shape
-    size = bucket(n)
-
-    def pad(a: np.ndarray, fill: float = 0.0) -> jax.Array:
-        width = [(0, 0)] * (a.ndim - 1) + [(0, size - n)]
-        return _float64(np.pad(a, width, constant_values=fill))
-
-    # Padded rows look along the normal, where every lobe is finite.
-    normal = geometry.from_angles(0.0, 0.0, 0.0, 0.0)
-    padded = jax.tree.map(
-        lambda a, z: pad(np.asarray(a), float(np.asarray(z))), rows.geometry, normal
-    )
-    angles, angle_rows = _polar_angles(rows.geometry, size, model)
-    target, padded_weight = pad(terms.target), pad(weight)
+    kappa, weight = _factors(rows, objective, options)
+    weight = weight if row_weights is None else weight * row_weights
+    n_channels, size = rows.value.shape[1], rows.padded.cos_i.size
+    value = _by_channel(rows, size)
+    target = value
+    kappa = padded(kappa, size, 1.0)
+    linear_weight = weight = padded(weight, size)
     if not OBJECTIVES[objective].linear:
-        slope = objectives.slope(objective, terms.value * terms.kappa) * terms.kappa
-        linear_target, linear_weight = pad(terms.value), pad(weight * slope)
-    elif np.all(terms.kappa == 1.0):
-        linear_target, linear_weight = target, padded_weight
-    else:
-        linear_target, linear_weight = pad(terms.value), pad(weight * terms.kappa)
-    scale = float(np.sum((weight * terms.target) ** 2))
+        target, linear_weight = room(value.shape), room(value.shape)
+        for c in range(n_channels):
+            v = value[c] * kappa
+            target[c] = objectives.transform(objective, v)
+            slope = objectives.slope(objective, v) * kappa
+            linear_weight[c] = weight[min(c, len(weight) - 1)] * slope
+    elif np.any(kappa != 1.0):
+        target = np.multiply(value, kappa, out=room(value.shape))
+        linear_weight = np.multiply(weight, kappa, out=room(weight.shape))
+    angles, angle_rows = _polar_angles(rows.geometry, size, model)
+    scale = _sum_of_squares(weight, target)
     energy = 0.0 if options.energy == "hard" else float(options.energy)
+    target, linear_target, weight, linear_weight = _on_device(
+        target, value, weight, linear_weight
+    )
     return Problem(
         model=model,
         unknowns=make_unknowns(model, n_channels, options),
         objective=objective,
         robust=math.isfinite(robust_width),
-        chunk=min(size, _CHUNK),
+        chunk=min(size, CHUNK),
         penalised=penalised,
-        geometry=padded,
+        geometry=jax.tree.map(jax.device_put, rows.padded),
         angles=angles,
         angle_rows=angle_rows,
-        kappa=pad(terms.kappa, 1.0),
-        weight=padded_weight,
+        kappa=jax.device_put(kappa),
+        weight=weight,
         target=target,
         linear_target=linear_target,
         linear_weight=linear_weight,
@@ -146,6 +152,27 @@ def prepare(
         scale=_float64(scale),
         pairs=jax.tree.map(_float64, reciprocity_pairs(model.ways)),
     )
+
+
+def _by_channel(rows: Rows, size: int) -> np.ndarray:
+    """The values ``(c, size)``, 0 where they are not valid, turned over block by block."""
+    n, n_channels = rows.value.shape
+    out = room((n_channels, size))
+    for begin in range(0, n, CHUNK):
+        part = slice(begin, min(begin + CHUNK, n))
+        out[:, part] = np.where(rows.valid[part], rows.value[part], 0.0).T
+    return out
+
+
+def _sum_of_squares(weight: np.ndarray, target: np.ndarray) -> float:
+    last = len(weight) - 1
+    return sum(float(np.sum((weight[min(c, last)] * t) ** 2)) for c, t in enumerate(target))
+
+
+def _on_device(*arrays: np.ndarray) -> list[jax.Array]:
+    """The arrays for JAX; what is one array remains one."""
+    made = {id(a): jax.device_put(a) for a in arrays}
+    return [made[id(a)] for a in arrays]
 
 
 def _polar_angles(g: geometry.Geometry, size: int, model: Model):
@@ -202,16 +229,6 @@ def for_channel(problem: Problem, c: int) -> Problem:
         linear_weight=row(problem.linear_weight),
         scale=jnp.sum((weight * target) ** 2),
     )
-
-
-def bucket(n: int) -> int:
-    """A padded size, so that files of similar length share compiled code."""
-    for size in _BUCKETS:
-        if n <= size:
-            return size
-    chunks = math.ceil(n / _CHUNK)
-    step = 1 << max(0, chunks.bit_length() - 3)
-    return math.ceil(chunks / step) * step * _CHUNK
 
 
 def reciprocity_pairs(ways: Sequence[Way] = ("front",)) -> geometry.Geometry:

@@ -7,11 +7,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import jax
 import numpy as np
 
 from data_formats import Measurement, MeasurementError
-from fitting import geometry
+from fitting.geometry import Geometry
 from fitting.models import Way
+from fitting.padding import padded_geometry
 from fitting.solid_angle import from_normal, solid_angle_weights
 
 _LARGEST = 1e100
@@ -38,10 +40,14 @@ def ways_of(measurement: Measurement) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Rows:
-    """The rows that a fit uses, as plain arrays, and why others were left out."""
+    """The rows that a fit uses, as plain arrays, and why others were left out.
+
+    The geometry is that of `padding.padded_geometry`, which all problems of these rows
+    share.
+    """
 
     index: np.ndarray
-    geometry: geometry.Geometry
+    padded: Geometry
     value: np.ndarray
     valid: np.ndarray
     sigma: np.ndarray | None
@@ -49,6 +55,11 @@ class Rows:
     left_out: tuple[str, ...]
     way: np.ndarray
     fitted: np.ndarray | None = None
+
+    @property
+    def geometry(self) -> Geometry:
+        """The geometry of the rows alone, ``(n,)``."""
+        return jax.tree.map(lambda a: a[: self.index.size], self.padded)
 
 
 def select_rows(
@@ -86,7 +97,7 @@ def select_rows(
     angles = (m.theta_i[keep], m.phi_i[keep], m.theta_r[keep], m.phi_r[keep])
     return Rows(
         index=np.flatnonzero(keep),
-        geometry=geometry.from_angles(*angles),
+        padded=padded_geometry(*angles),
         value=m.value[keep],
         valid=m.valid[keep],
         sigma=None if m.sigma is None else m.sigma[keep],

@@ -12,7 +12,7 @@ import pytest
 import synthetic
 from scipy.optimize import least_squares
 
-from fitting import problem, reduced, solve, starts
+from fitting import padding, problem, reduced, solve, starts
 from fitting.model import Model
 from fitting.objectives import OBJECTIVES, transform
 from fitting.options import FitOptions
@@ -173,12 +173,12 @@ def test_chunks_and_padding_change_nothing(noisy):
         for a, b in zip(whole, evaluate(parts, u, x), strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-15)
         n = select_rows(noisy, 85.0).index.size
-        assert p.kappa.shape[0] == problem.bucket(n) > n
+        assert p.kappa.shape[0] == padding.bucket(n) > n
 
 
 def test_buckets_waste_at_most_a_third_and_are_whole_chunks():
     for n in [1, 100, 1434, 4097, 10_804, 50_000, 10**6, 10**7]:
-        size = problem.bucket(n)
+        size = padding.bucket(n)
         assert size >= n
         assert size <= 128 or size < 2 * n
         if size > 4096:

@@ -114,7 +114,7 @@ class FitFile:
 
     def _fitted(self, measurement: Measurement) -> str:
         from fitting.cli import fit_run, jax_setup
-        from fitting.problem import bucket
+        from fitting.padding import bucket
 
         size = [bucket(measurement.n_rows), measurement.n_channels]
         what = json.dumps([self.recipe, size], sort_keys=True, default=str)

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from fitting.geometry import Geometry, from_angles
 from fitting.model import Model
-from fitting.problem import bucket
+from fitting.padding import bucket
 from fitting.scene.nodes import Nodes
 
 _AT_ONCE = 1 << 16

@@ -31,7 +31,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from fitting import FitOptions, Model
-from fitting.geometry import Geometry, from_angles
+from fitting.geometry import Geometry
+from fitting.padding import padded_geometry
 from fitting.predict import predict_geometry
 from fitting.problem import prepare
 from fitting.reduced import Problem
@@ -64,7 +65,7 @@ def made(n: int, channels: int, seed: int = 0) -> Made:
     near = np.clip(theta_i + 0.15 * rng.standard_normal(n), 0.0, 1.45)
     theta_r = np.where(mirror, near, np.arccos(rng.uniform(0.1, 1.0, n)))
     turn = np.where(mirror, 0.15 * rng.standard_normal(n), rng.uniform(0, 2 * np.pi, n))
-    g = from_angles(theta_i, np.zeros(n), theta_r, np.pi + turn)
+    g = padded_geometry(theta_i, np.zeros(n), theta_r, np.pi + turn)
     spectrum = np.linspace(0.0, 1.0, channels)
     truth = {
         "lambert.albedo": 0.1 + 0.4 * spectrum,
@@ -72,11 +73,11 @@ def made(n: int, channels: int, seed: int = 0) -> Made:
         "ggx.f0": 0.04 + 0.01 * spectrum,
         "ggx.f90": 0.9 - 0.1 * spectrum,
     }
-    value = np.array(predict_geometry(Model(MODEL), truth, g))
+    value = predict_geometry(Model(MODEL), truth, g)[:n].copy()
     value *= 1.0 + 0.01 * rng.standard_normal(value.shape)
     return Made(
         Rows(
-            index=np.arange(n), geometry=g, value=value,
+            index=np.arange(n), padded=g, value=value,
             valid=np.broadcast_to(True, value.shape), sigma=None, solid_angle=np.ones(n),
             left_out=(), way=np.broadcast_to("front", n),
         ),
