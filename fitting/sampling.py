@@ -21,6 +21,8 @@ _TOP, _FAR = 0.3, 3.0
 _ENOUGH = 3
 _MANY_ANGLES = 90
 _PERTURBATION = 1e-3
+# Rows that are looked at first, and at a time.
+_FEW, _BLOCK = 1024, 1 << 16
 
 
 class Distances(NamedTuple):
@@ -204,31 +206,60 @@ def _of_width(
     )
 
 
-def visible_width(problem: Problem, lobe: Lobe, shape: dict[str, float]) -> float | None:
+def brightness(problem: Problem) -> np.ndarray:
+    """Largest value of every row ``(n,)`` among channels that count; -inf if none does."""
+    weight, value = np.asarray(problem.weight), np.asarray(problem.linear_target)
+    if len(weight) == 1:
+        return np.where(weight[0] > 0, value.max(axis=0), -np.inf)
+    out = np.full(value.shape[1], -np.inf)
+    for w, v in zip(weight, value, strict=True):
+        np.maximum(out, np.where(w > 0, v, -np.inf), out=out)
+    return out
+
+
+def visible_width(
+    problem: Problem,
+    bright: np.ndarray,
+    lobe: Lobe,
+    shape: dict[str, float],
+    widest: float,
+) -> float | None:
     """Slope at which the data fall to half of their largest value, roughly.
 
     Between the last row that is above half and the first one beyond that is below. None
-    for a lobe without a peak, or where no row lies beyond.
+    for a lobe without a peak, where no row lies beyond, or if it is more than ``widest``.
+    ``bright`` is the problem's `brightness`.
     """
     own = {n: jnp.asarray(v) for n, v in shape.items()}
     peak = lobe.peak(own)
     if peak is None:
         return None
     geometry = jax.tree.map(np.asarray, problem.geometry)
-    if isinstance(peak, AxisPeak):
-        slope = axis_slopes(_towards(geometry, lobe)[0], peak)
-    else:
-        slope = np.hypot(*facet_slopes(geometry, lobe, own))
-    used = used_rows(problem) & np.asarray(geometry.on(lobe.ways))
-    weighted = np.where(np.asarray(problem.weight) > 0, problem.linear_target, -np.inf)
-    value = np.max(weighted, axis=0)[used]
-    slope = slope[used]
+
+    def located(rows: slice | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        g = jax.tree.map(lambda a: a[rows], geometry)
+        if isinstance(peak, AxisPeak):
+            slope = axis_slopes(_towards(g, lobe)[0], peak)
+        else:
+            slope = np.hypot(*facet_slopes(g, lobe, own))
+        return np.asarray(g.on(lobe.ways)), slope
+
+    # Few data are narrow, which a few of the brightest rows tell.
+    top = int(np.argmax(bright))
+    few = np.flatnonzero(bright >= 0.5 * bright[top])[:_FEW]
+    on, slope = located(np.append(few, top))
+    if on[-1] and bright[top] > 0 and np.max(slope[on]) > widest:
+        return None
+    blocks = [located(slice(i, i + _BLOCK)) for i in range(0, bright.size, _BLOCK)]
+    on, slope = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    used = on & (bright > -np.inf)
+    value, slope = bright[used], slope[used]
     if not (value.size and np.max(value) > 0):
         return None
-    bright = value >= 0.5 * np.max(value)
-    inside = float(np.max(slope[bright]))
+    inside = float(np.max(slope[value >= 0.5 * np.max(value)]))
     beyond = slope[slope > inside]
     if not (beyond.size and np.isfinite(np.min(beyond))):
         return None
     outside = float(np.min(beyond))
-    return float(np.sqrt(max(inside, 0.1 * outside) * outside))
+    width = float(np.sqrt(max(inside, 0.1 * outside) * outside))
+    return width if width <= widest else None

@@ -87,10 +87,11 @@ def _equal_lobes(names: list[str]) -> list[list[list[int]]]:
 def best_starts(problem: Problem, count: int) -> tuple[np.ndarray, np.ndarray]:
     """The ``count`` best distinct points of the scan, with their coefficients."""
     points = candidates(problem)
-    narrow = narrow_candidates(problem, points)
+    bright = sampling.brightness(problem)
+    narrow = narrow_candidates(problem, bright, points)
     if narrow.size:
         points = np.concatenate([points, narrow])
-    cost, x = scan(thinned(problem), jnp.asarray(points))
+    cost, x = scan(thinned(problem, bright), jnp.asarray(points))
     cost = np.where(np.isfinite(cost), np.asarray(cost), np.inf)
     chosen: list[int] = []
     for i in np.argsort(cost, kind="stable"):
@@ -102,10 +103,12 @@ def best_starts(problem: Problem, count: int) -> tuple[np.ndarray, np.ndarray]:
     return points[chosen], np.asarray(x)[chosen]
 
 
-def narrow_candidates(problem: Problem, points: np.ndarray) -> np.ndarray:
+def narrow_candidates(
+    problem: Problem, bright: np.ndarray, points: np.ndarray
+) -> np.ndarray:
     """More points ``(p, k)`` for data with a peak narrower than where the lobes start.
 
-    Copies of the first points, each with the width of one lobe about as the data show it.
+    ``bright (n,)`` is the rows' `sampling.brightness`. Copies of the first points, each with the width of one lobe about as the data show it.
     None for ordinary data.
     """
     model, free = problem.model, problem.unknowns.free_shape
@@ -114,8 +117,10 @@ def narrow_candidates(problem: Problem, points: np.ndarray) -> np.ndarray:
     for label, lobe in zip(model.labels, model.lobes, strict=True):
         shape = {p.name: p.default for p in lobe.parameters() if not p.coefficient}
         own = [n for n in shape if f"{label}.{n}" in free]
-        width = sampling.visible_width(problem, lobe, shape) if own else None
-        if width is None or width > _NARROW:
+        if not own:
+            continue
+        width = sampling.visible_width(problem, bright, lobe, shape, _NARROW)
+        if width is None:
             continue
         columns = []
         for name in sampling.width_parameters(lobe, shape, own):
@@ -178,18 +183,16 @@ def _sizes(
     return nodes, x if np.ptp(x) > 0 else y
 
 
-def thinned(problem: Problem) -> Problem:
+def thinned(problem: Problem, bright: np.ndarray) -> Problem:
     """At most `_SCAN_ROWS` rows, drawn with a fixed seed: enough to find the basin.
 
     The brightest rows are all there, lest a narrow peak be missed; each of the others
-    stands for as many as were left out.
+    stands for as many as were left out. ``bright (n,)`` is their `sampling.brightness`.
     """
     n = problem.kappa.shape[0]
     if n <= _SCAN_ROWS:
         return problem
-    used = np.asarray(problem.weight) > 0
-    value = np.max(np.where(used, np.asarray(problem.linear_target), -np.inf), axis=0)
-    order = np.argpartition(-value, _BRIGHT_ROWS)
+    order = np.argpartition(-bright, _BRIGHT_ROWS)
     drawn = _SCAN_ROWS - _BRIGHT_ROWS
     rng = np.random.default_rng(0)
     others = np.sort(rng.choice(n - _BRIGHT_ROWS, drawn, replace=False, shuffle=False))
@@ -200,17 +203,17 @@ def thinned(problem: Problem) -> Problem:
     def take(a):
         return np.asarray(a)[..., rows]
 
+    target = linear_target = take(problem.linear_target)
+    if problem.target is not problem.linear_target:
+        target = take(problem.target)
     return dataclasses.replace(
         problem,
         chunk=_SCAN_ROWS,
         geometry=jax.tree.map(take, problem.geometry),
         angle_rows=jax.tree.map(take, problem.angle_rows),
-        **{
-            name: take(getattr(problem, name))
-            for name in ("kappa", "target", "linear_target")
-        },
-        **{
-            name: take(getattr(problem, name)) * stands_for
-            for name in ("weight", "linear_weight")
-        },
+        kappa=take(problem.kappa),
+        target=target,
+        linear_target=linear_target,
+        weight=take(problem.weight) * stands_for,
+        linear_weight=take(problem.linear_weight) * stands_for,
     )

@@ -28,6 +28,10 @@ def said(expression, angles, **shape):
         return sampling.sentences(prepared(expression, truth, angles), truth)
 
 
+def narrow(p):
+    return starts.narrow_candidates(p, sampling.brightness(p), starts.candidates(p))
+
+
 def test_rows_within_the_lobe_at_one_angle_of_incidence_show_its_width():
     fine = extremes.fine_directions()
     for alpha in (1e-3, 1e-2, 0.1, 1.0):
@@ -92,10 +96,10 @@ def test_peaks_narrower_than_the_usual_starts_get_starts_of_their_own(
     with jax.enable_x64(True):
         p = prepared(expression, truth, extremes.fine_directions())
         column = p.unknowns.free_shape.index(f"{name}.{parameter}")
-        more = starts.narrow_candidates(p, starts.candidates(p))
+        more = narrow(p)
         found = [float(p.unknowns.shape(u)[f"{name}.{parameter}"]) for u in more]
         usual = prepared(*extremes.truth_of(name, 0.1), extremes.fine_directions())
-        assert not starts.narrow_candidates(usual, starts.candidates(usual)).size
+        assert not narrow(usual).size
     assert np.ptp(more[:, column]) > 0
     assert min(abs(np.log(f / value)) for f in found) < np.log(4.0)
 
@@ -111,7 +115,7 @@ def test_the_thinned_scan_keeps_a_peak_of_few_rows():
     expression, truth = extremes.truth_of("ggx", 2e-3)
     with jax.enable_x64(True):
         p = prepared(expression, truth, (theta_i, np.zeros(n), theta_r, phi_r))
-        thin = starts.thinned(p)
+        thin = starts.thinned(p, sampling.brightness(p))
         assert float(thin.target.max()) == float(p.target.max())
         whole = float((np.asarray(p.weight) ** 2).sum())
         assert float((np.asarray(thin.weight) ** 2).sum()) == pytest.approx(whole, rel=0.1)
