@@ -108,8 +108,8 @@ def narrow_candidates(
 ) -> np.ndarray:
     """More points ``(p, k)`` for data with a peak narrower than where the lobes start.
 
-    ``bright (n,)`` is the rows' `sampling.brightness`. Copies of the first points, each with the width of one lobe about as the data show it.
-    None for ordinary data.
+    Copies of the first points, each with the width of one lobe about as the data show it.
+    None for ordinary data. ``bright (n,)`` is the rows' `sampling.brightness`.
     """
     model, free = problem.model, problem.unknowns.free_shape
     lower, upper = np.asarray(problem.unknowns.lower), np.asarray(problem.unknowns.upper)
