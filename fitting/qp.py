@@ -28,7 +28,7 @@ class QPSolution(NamedTuple):
     active: Bool[Array, "c p"]
 
 
-def inverse(matrix: Float[Array, "*b m m"]) -> Float[Array, "*b m m"]:
+def inverse(matrix: Float[Array, "m m *b"]) -> Float[Array, "m m *b"]:
     """Inverse of symmetric positive definite matrices by the sweep operator.
 
     One rank-one update per row (Goodnight 1979, The American Statistician 33, 149):
@@ -36,21 +36,20 @@ def inverse(matrix: Float[Array, "*b m m"]) -> Float[Array, "*b m m"]:
     are kept above `_RIDGE` times the diagonal, which makes a singular matrix usable in
     the directions that the data determine.
     """
-    m = matrix.shape[-1]
-    floor = _RIDGE * jnp.abs(jnp.diagonal(matrix, axis1=-2, axis2=-1)) + 1e-300
+    m = matrix.shape[0]
+    floor = _RIDGE * jnp.abs(jnp.einsum("ii...->i...", matrix)) + 1e-300
+    number = jnp.arange(m).reshape(m, *(1,) * (matrix.ndim - 2))
 
     def sweep(i: Array, a: Array) -> Array:
-        here = jnp.arange(m) == i
-        row = jnp.sum(jnp.where(here[:, None], a, 0.0), axis=-2)
-        pivot = jnp.sum(jnp.where(here, row, 0.0), axis=-1)
-        pivot = jnp.maximum(pivot, jnp.sum(jnp.where(here, floor, 0.0), axis=-1))
-        row = jnp.where(here, -1.0, row) / pivot[..., None]
-        column = jnp.where(here, -1.0, row * pivot[..., None])
+        here = number == i
+        row = a[i]
+        pivot = jnp.maximum(row[i], floor[i])
+        row = jnp.where(here, -1.0, row) / pivot
+        column = jnp.where(here, -1.0, row * pivot)
         rest = jnp.where(here[:, None] | here, 0.0, a)
-        return rest - column[..., :, None] * row[..., None, :]
+        return rest - column[:, None] * row
 
-    swept = jax.lax.fori_loop(0, m, sweep, matrix)
-    return -swept
+    return -jax.lax.fori_loop(0, m, sweep, matrix)
 
 
 def product(matrix: Float[Array, "*b m k"], x: Float[Array, "*b k"]) -> Array:
@@ -70,60 +69,59 @@ def solve(
     alg. 16.4) on the problem scaled to a unit diagonal. A coefficient whose constraint
     ends up active is put exactly on it where the constraint is a bound.
     """
-    diagonal = jnp.einsum("cii->ci", hessian)
+    # The channels last, for loops in vector registers over them.
+    g, b = jnp.moveaxis(hessian, 0, -1), linear.T
+    diagonal = jnp.einsum("iic->ic", g)
     d = jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
-    g = hessian / (d[:, :, None] * d[:, None, :])
-    m = g.shape[-1]
-    g = g + _RIDGE * jnp.eye(m, dtype=g.dtype)
-    b = linear / d
-    size = jnp.maximum(jnp.max(jnp.abs(b), axis=1, keepdims=True), 1e-300)
+    g = g / (d[:, None] * d) + _RIDGE * jnp.eye(d.shape[0], dtype=g.dtype)[:, :, None]
+    b = b / d
+    size = jnp.maximum(jnp.max(jnp.abs(b), axis=0), 1e-300)
     b = b / size
+
+    def unscaled(x: Array, free: Array) -> tuple[Array, Array]:
+        return (x * size / d).T, jnp.moveaxis(free / (d[:, None] * d), -1, 0)
+
     if rows.shape[0] == 0:
-        full = inverse(g)
-        x = product(full, b)
-        none = jnp.zeros((g.shape[0], 0), dtype=bool)
-        return QPSolution(x * size / d, full / (d[:, :, None] * d[:, None, :]), none)
+        free = inverse(g)
+        none = jnp.zeros((g.shape[-1], 0), dtype=bool)
+        return QPSolution(*unscaled(_times(free, b), free), none)
 
-    scaled = rows[None] / d[:, None, :]
-    norm = jnp.linalg.norm(scaled, axis=-1)
-    a = scaled / norm[..., None]
-    h = limits / (norm * size)
-
-    def products(x: Array) -> Array:
-        return product(a, x)
+    a = rows[:, :, None] / d
+    norm = jnp.sqrt(jnp.sum(a * a, axis=1))
+    a = a / norm[:, None]
+    h = limits.T / (norm * size)
 
     def gram(weight: Array) -> Array:
-        stiff = weight[:, :, None, None] * a[:, :, :, None] * a[:, :, None, :]
-        return jnp.sum(stiff, axis=1)
+        return jnp.sum(weight[:, None, None] * a[:, :, None] * a[:, None], axis=0)
 
     def transposed(z: Array) -> Array:
-        return jnp.sum(a * z[:, :, None], axis=1)
+        return jnp.sum(a * z[:, None], axis=0)
 
     def step_length(v: Array, dv: Array) -> Array:
         ratio = jnp.where(dv < 0, -v / jnp.where(dv < 0, dv, -1.0), jnp.inf)
-        return jnp.minimum(1.0, jnp.min(ratio, axis=1, keepdims=True))
+        return jnp.minimum(1.0, jnp.min(ratio, axis=0))
 
     def body(carry):
         x, s, z, steps, _ = carry
-        dual = product(g, x) - b - transposed(z)
-        primal = products(x) - h - s
-        mu = jnp.mean(s * z, axis=1, keepdims=True)
+        dual = _times(g, x) - b - transposed(z)
+        primal = _times(a, x) - h - s
+        mu = jnp.mean(s * z, axis=0)
         newton = inverse(g + gram(z / s))
 
         def direction(target: Array) -> tuple[Array, Array, Array]:
-            dx = product(newton, transposed((target - z * primal) / s) - dual)
-            ds = products(dx) + primal
+            dx = _times(newton, transposed((target - z * primal) / s) - dual)
+            ds = _times(a, dx) + primal
             return dx, ds, (target - z * ds) / s
 
         _, ds, dz = direction(-s * z)
         reach_s, reach_z = step_length(s, ds), step_length(z, dz)
-        mu_ahead = jnp.mean((s + reach_s * ds) * (z + reach_z * dz), axis=1, keepdims=True)
+        mu_ahead = jnp.mean((s + reach_s * ds) * (z + reach_z * dz), axis=0)
         centring = (mu_ahead / mu) ** 3
         dx, ds, dz = direction(centring * mu - s * z - ds * dz)
         reach = 0.995 * jnp.minimum(step_length(s, ds), step_length(z, dz))
         x, s, z = x + reach * dx, s + reach * ds, z + reach * dz
         s, z = jnp.maximum(s, 1e-30), jnp.maximum(z, 1e-30)
-        gap = jnp.mean(s * z, axis=1) + jnp.max(jnp.abs(reach * dx), axis=1) ** 2 * 1e-2
+        gap = jnp.mean(s * z, axis=0) + jnp.max(jnp.abs(reach * dx), axis=0) ** 2 * 1e-2
         return x, s, z, steps + 1, jnp.max(gap)
 
     def unfinished(carry):
@@ -131,20 +129,20 @@ def solve(
         return (steps < _MAX_STEPS) & (gap > _TOLERANCE)
 
     x0 = jnp.zeros_like(b)
-    s0 = jnp.maximum(products(x0) - h, 1.0)
+    s0 = jnp.maximum(-h, 1.0)
     z0 = jnp.ones_like(s0)
     gap0 = jnp.full((), jnp.inf, dtype=b.dtype)
     x, s, z, _, _ = jax.lax.while_loop(unfinished, body, (x0, s0, z0, 0, gap0))
 
     stiffness = jnp.minimum(z / s, _MAX_STIFFNESS)
-    free = inverse(g + gram(stiffness))
-    active = z > s
-    x = x * size / d
-    return QPSolution(
-        _put_on_bounds(x, rows, limits, active),
-        free / (d[:, :, None] * d[:, None, :]),
-        active,
-    )
+    x, free = unscaled(x, inverse(g + gram(stiffness)))
+    active = (z > s).T
+    return QPSolution(_put_on_bounds(x, rows, limits, active), free, active)
+
+
+def _times(matrix: Array, x: Array) -> Array:
+    """Matrix times vector for every channel, the last axis of both."""
+    return jnp.sum(matrix * x, axis=1)
 
 
 def _put_on_bounds(x: Array, rows: Array, limits: Array, active: Array) -> Array:
