@@ -98,6 +98,6 @@ def test_inverse_by_sweeping(m):
     scale = 1.0 / np.sqrt(np.einsum("cii->ci", hessian))
     unit = hessian * scale[:, :, None] * scale[:, None, :]
     with jax.enable_x64(True):
-        inverse = np.moveaxis(qp.inverse(np.moveaxis(unit, 0, -1)), -1, 0)
+        inverse = np.moveaxis(np.asarray(qp.inverse(np.moveaxis(unit, 0, -1))), -1, 0)
         product = inverse @ unit
     np.testing.assert_allclose(product, np.tile(np.eye(m), (7, 1, 1)), atol=1e-9)
