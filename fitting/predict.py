@@ -5,12 +5,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fitting.compiled import compiled
 from fitting.geometry import Geometry, from_angles
 from fitting.model import Model
 from fitting.padding import bucket
@@ -26,7 +25,7 @@ def _cached(expression: str) -> Model:
     return Model(expression)
 
 
-@eqx.filter_jit
+@compiled()
 def _evaluate(model: Model, values: dict, geometry: Geometry) -> jax.Array:
     return model(values, geometry)
 
@@ -59,8 +58,8 @@ def predict_geometry(
     if n == 0:
         return np.zeros((0, _channels(values)))
     with jax.enable_x64(True):
-        padded = jax.tree.map(lambda a: jnp.asarray(pad(a)), geometry)
-        own = {k: jnp.asarray(v, dtype=jnp.float64) for k, v in values.items()}
+        padded = jax.tree.map(pad, geometry)
+        own = {k: np.asarray(v, dtype=np.float64) for k, v in values.items()}
         out = np.asarray(_evaluate(model, own, padded))[:n]
     return out.reshape((*shape, *out.shape[1:]))
 

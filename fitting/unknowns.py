@@ -7,7 +7,6 @@ import itertools
 import math
 import re
 
-import jax.numpy as jnp
 import numpy as np
 
 from fitting.albedo import LEAVING, lit_sides
@@ -87,12 +86,12 @@ def make_unknowns(model: Model, n_channels: int, options: FitOptions) -> Unknown
         coefficient_names=tuple(linear_names),
         coefficient_source=linear_source,
         n_coefficients=len(linear_free),
-        shape_constant=jnp.asarray(_columns([fixed.get(n, 0.0) for n in shape_names])),
-        lower=jnp.asarray([low for low, _ in supports]),
-        upper=jnp.asarray([high for _, high in supports]),
-        coefficient_constant=jnp.asarray(constant),
-        rows=jnp.asarray(rows),
-        limits=jnp.asarray(limits),
+        shape_constant=_columns([fixed.get(n, 0.0) for n in shape_names]),
+        lower=np.array([low for low, _ in supports], dtype=np.float64),
+        upper=np.array([high for _, high in supports], dtype=np.float64),
+        coefficient_constant=constant,
+        rows=rows,
+        limits=limits,
     )
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from fitting.albedo import LEAVING, Side, lit_sides, model_albedo
+from fitting.compiled import compiled
 from fitting.geometry import Geometry
 from fitting.model import Model
 from fitting.models.lobe import THROUGH
@@ -34,14 +34,14 @@ class WorstAlbedo(NamedTuple):
 
 def worst_albedo(model: Model, found: list[Found]) -> WorstAlbedo:
     """Over polar angles up to 89.5 deg from both sides; call with x64 enabled."""
-    cosines = jnp.asarray(np.cos(np.radians(_THETA_DEG)))
+    cosines = np.cos(np.radians(_THETA_DEG))
     azimuths = np.radians([0.0, 45.0, 90.0, 135.0] if model.anisotropic else [0.0])
     worst = WorstAlbedo(-math.inf, 0.0, 0, "front", 0.0)
     for side in lit_sides(model):
         channel = 0
         for f in found:
             for azimuth in azimuths:
-                both = _dense_albedo(model, f.values(), cosines, jnp.asarray(azimuth), side)
+                both = _dense_albedo(model, f.values(), cosines, azimuth, side)
                 e, through = (np.asarray(b).reshape(_THETA_DEG.size, -1) for b in both)
                 k, c = np.unravel_index(int(np.argmax(e)), e.shape)
                 here = WorstAlbedo(
@@ -53,7 +53,7 @@ def worst_albedo(model: Model, found: list[Found]) -> WorstAlbedo:
     return worst
 
 
-@eqx.filter_jit
+@compiled()
 def _dense_albedo(
     model: Model,
     values: dict[str, Any],

@@ -51,7 +51,10 @@ def set_up() -> None:
     same_sums(cores())
     import jax
 
+    from fitting import kept_programs
+
     folder = writable_cache()
+    kept_programs.keep_in(folder)
     if folder is None:
         return
     jax.config.update("jax_compilation_cache_dir", str(folder))

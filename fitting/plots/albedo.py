@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +18,7 @@ from matplotlib.lines import Line2D
 
 from data_formats import MeasurementError
 from fitting.albedo import LEAVING, Side, lit_sides, model_albedo
+from fitting.compiled import compiled
 from fitting.model import Model
 from fitting.models import Way
 from fitting.models.lobe import THROUGH
@@ -140,7 +140,7 @@ def albedo_curve(
     )
 
 
-@eqx.filter_jit
+@compiled()
 def _albedo(
     model: Model, values: dict[str, Any], cosines: jax.Array, azimuth: jax.Array,
     ways: tuple[Way, ...],

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from fitting.compiled import compiled
 from fitting.geometry import Geometry, from_components
 from fitting.models import Lobe, Shape
 
@@ -81,12 +81,12 @@ def basis_table(lobe: Lobe, shape: Shape, geometry: Geometry) -> Array:
     return jnp.stack(lobe.basis(shape, geometry))[:, None, :]
 
 
-@eqx.filter_jit
+@compiled()
 def _basis(lobe: Lobe, shape: dict, geometry: Geometry) -> Array:
     return basis_table(lobe, shape, geometry)
 
 
-@eqx.filter_jit
+@compiled()
 def _sums(lobe: Lobe, shape: dict, geometry: Geometry, weight: Array) -> tuple:
     def total(own: dict) -> Array:
         return basis_table(lobe, own, geometry) @ weight

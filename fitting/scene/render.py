@@ -12,13 +12,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import ArrayLike
 
+from fitting.compiled import compiled
 from fitting.geometry import Geometry, from_angles
 from fitting.model import Model
 from fitting.padding import bucket
@@ -66,7 +66,7 @@ def render(model: Model, values: Mapping[str, ArrayLike], lights: Sequence[Nodes
     return _image(np.asarray(halves))
 
 
-@eqx.filter_jit
+@compiled()
 def radiance(
     model: Model,
     values: dict[str, Array],
