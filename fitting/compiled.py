@@ -1,25 +1,32 @@
 """Compiled functions, which need not be traced again in every process.
 
 JAX keeps compiled code across processes, but to find it there a function must be traced
-and lowered, which takes longer than the fit. Functions marked `compiled` keep the lowered
-program too, where the process has a folder for it (`fitting.kept_programs`).
+and lowered, which takes longer than the fit. Functions marked `compiled` are found by what
+they are given, where the process has a folder for that (`fitting.kept_programs`).
 """
 
 from __future__ import annotations
 
 import functools
+import weakref
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.core import Tracer
 
 from fitting import kept_programs
 from fitting.kept_programs import Program
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
+# Linux grants a process 65,530 regions of memory; every compiled function takes three for
+# good, small ones included, and where they are used up the compiler aborts.
+_MANY = 30_000
+_REGIONS = Path("/proc/self/maps")
 
 
 def compiled(
@@ -38,15 +45,16 @@ class Compiled(Generic[_P, _T]):
 
     def __init__(self, function: Callable[_P, _T], options: dict[str, Any] | None):
         functools.update_wrapper(self, function)
-        self._function, self._options = function, options
+        self._function: Callable[..., _T] = function
+        self._options = options
         self._jitted = eqx.filter_jit(function, compiler_options=options)  # pyright: ignore
         self._ready: dict[Any, Callable[..., Any]] = {}
+        _all.add(self)
 
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        folder = kept_programs.folder()
         leaves, tree = jax.tree.flatten((args, kwargs))
         arrays = [v for v in leaves if eqx.is_array(v)]
-        if folder is None or any(isinstance(v, jax.core.Tracer) for v in arrays):
+        if kept_programs.folder() is None or any(isinstance(v, Tracer) for v in arrays):
             return self._jitted(*args, **kwargs)
         # Precision as it is now, which decides about numbers that have none of their own.
         key = (tree, str(jnp.result_type(float)), *map(_kind, leaves))
@@ -54,6 +62,10 @@ class Compiled(Generic[_P, _T]):
         if run is None:
             run = self._ready[key] = self._made_ready(key, leaves)
         return run(*arrays) if run is not self._jitted else run(*args, **kwargs)
+
+    def forget(self) -> None:
+        """What was read or compiled; what is needed is read again."""
+        self._ready.clear()
 
     def _made_ready(self, key: tuple, leaves: list[Any]) -> Callable[..., Any]:
         """A function of the arrays alone, or of everything where it cannot be kept."""
@@ -65,11 +77,9 @@ class Compiled(Generic[_P, _T]):
         program = kept_programs.read(described)
         if program is None:
             arrays = [v for v in leaves if eqx.is_array(v)]
-            program = kept_programs.made(self._flat(tree, leaves), arrays)
-            if program is None:
-                return self._jitted
-            kept_programs.write(described, program)
-        return self._runner(program)
+            function = self._flat(tree, leaves)
+            program = kept_programs.made(described, function, arrays, self._options)
+        return self._jitted if program is None else _joined(program)
 
     def _flat(self, tree: Any, leaves: list[Any]) -> Callable[..., _T]:
         """The function of its arrays, in order."""
@@ -86,9 +96,9 @@ class Compiled(Generic[_P, _T]):
 
         return flat
 
-    def _runner(self, program: Program) -> Callable[..., Any]:
-        run = jax.jit(program.exported.call, compiler_options=self._options)
-        return lambda *arrays: jax.tree.unflatten(program.out_tree, run(*arrays))
+
+def _joined(program: Program) -> Callable[..., Any]:
+    return lambda *arrays: jax.tree.unflatten(program.out_tree, program.run(*arrays))
 
 
 def _kind(leaf: Any) -> Any:
@@ -96,3 +106,14 @@ def _kind(leaf: Any) -> Any:
     if not eqx.is_array(leaf):
         return type(leaf).__name__, leaf
     return jnp.shape(leaf), str(leaf.dtype), bool(getattr(leaf, "weak_type", False))
+
+
+_all: weakref.WeakSet[Compiled] = weakref.WeakSet()
+
+
+def make_room() -> None:
+    """Forget what was compiled if it has become much; what is needed is compiled again."""
+    if _REGIONS.exists() and _REGIONS.read_bytes().count(b"\n") > _MANY:
+        jax.clear_caches()
+        for function in _all:
+            function.forget()

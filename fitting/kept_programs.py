@@ -1,8 +1,9 @@
-"""Lowered programs as files, for other processes and later runs.
+"""Compiled programs as files, for other processes and later runs.
 
 A program is found by a description of everything that it depends on: the function, the
-kinds of its arguments, this package's sources, versions, the kind of device. Nothing in a
-file is run by reading it; a damaged one, or one of another description, is not used.
+kinds of its arguments, this package's sources, versions, the processor. A damaged file, or
+one of another description, is not used. As with JAX's own cache, who can write into the
+folder can decide what is run.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ import hashlib
 import importlib
 import json
 import os
-import tempfile
+import platform
+import zlib
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -21,16 +23,21 @@ from typing import Any, NamedTuple
 
 import jax
 
+from fitting.batch.writing import replace_file
+
 _PACKAGE = Path(__file__).parent
+# Where nothing is compiled, and changes most often.
+_COMPILES_NOTHING = _PACKAGE / "cli"
 _SUFFIX = ".program"
 _PLAIN = (type(None), bool, int, float, str)
+_NEVER = 1e9
 _folder: Path | None = None
 
 
 class Program(NamedTuple):
-    """A lowered program of arrays, and how its results are put together."""
+    """A compiled program of arrays that lists its results, and how these are arranged."""
 
-    exported: Any
+    run: Callable[..., list[Any]]
     out_tree: Any
 
 
@@ -53,15 +60,24 @@ def description(
     try:
         parts = [*_described_tree(tree)]
         arguments = [_described(k) for k in kinds]
+        chosen = _described(sorted((options or {}).items()))
     except TypeError:
         return None
-    return json.dumps(
-        [name, _described(sorted((options or {}).items())), parts, arguments, *_machine()]
-    )
+    return json.dumps([name, chosen, parts, arguments, _device(), *_surroundings()])
 
 
-def made(function: Callable[..., Any], arrays: list[Any]) -> Program | None:
-    """The program of a function of arrays, or None if it is one that JAX cannot keep."""
+def made(
+    described: str,
+    function: Callable[..., Any],
+    arrays: list[Any],
+    options: dict[str, Any] | None,
+) -> Program | None:
+    """The program of a function of arrays, from now on kept if that is possible.
+
+    None if it calls others, such as LAPACK's, which would have to be found again.
+    """
+    from jax.experimental import serialize_executable
+
     trees: list[Any] = []
 
     def listed(*arrays: Any) -> list[Any]:
@@ -69,37 +85,37 @@ def made(function: Callable[..., Any], arrays: list[Any]) -> Program | None:
         trees.append(tree)
         return results
 
-    try:
-        return Program(jax.export.export(jax.jit(listed))(*arrays), trees[-1])
-    except (NotImplementedError, TypeError, ValueError):
+    lowered = jax.jit(listed, compiler_options=options).lower(*arrays)
+    if "custom_call" in lowered.as_text():
         return None
+    with _without_writing_to_jax_cache():
+        compiled = lowered.compile()
+    program = Program(compiled, trees[-1])
+    with contextlib.suppress(NotImplementedError, TypeError, ValueError):
+        payload, *_ = serialize_executable.serialize(compiled)
+        head = [described, len(arrays), _outlined(program.out_tree)]
+        content = zlib.compress(json.dumps(head).encode() + b"\n" + payload, 1)
+        with contextlib.suppress(OSError):
+            replace_file(_path(described), content)
+    return program
 
 
 def read(described: str) -> Program | None:
     """The program of this description, if there is a sound one."""
+    from jax.experimental import serialize_executable
+
     try:
-        with _path(described).open("rb") as file:
-            head = json.loads(file.readline())
-            if head["program of"] != described:
-                return None
-            exported = jax.export.deserialize(bytearray(file.read()))
-            return Program(exported, jax.tree.structure(_rebuilt(head["results"])))
+        head, _, payload = zlib.decompress(_path(described).read_bytes()).partition(b"\n")
+        of, n_arguments, outline = json.loads(head)
+        if of != described:
+            return None
+        out_tree = jax.tree.structure(_rebuilt(outline))
+        arguments = jax.tree.structure(((0,) * n_arguments, {}))
+        results = jax.tree.structure([0] * out_tree.num_leaves)
+        run = serialize_executable.deserialize_and_load(payload, arguments, results)
+        return Program(run, out_tree)
     except Exception:  # Whatever is wrong with it: it is made again.
         return None
-
-
-def write(described: str, program: Program) -> None:
-    """Keep a program if that is possible; whole or not at all, whoever else does too."""
-    try:
-        head = {"program of": described, "results": _outlined(program.out_tree)}
-        content = json.dumps(head).encode() + b"\n" + program.exported.serialize()
-    except (TypeError, ValueError):
-        return
-    path = _path(described)
-    with contextlib.suppress(OSError):
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(content)
-        os.replace(file.name, path)
 
 
 def _path(described: str) -> Path:
@@ -107,19 +123,47 @@ def _path(described: str) -> Path:
     return _folder / (hashlib.sha256(described.encode()).hexdigest()[:40] + _SUFFIX)
 
 
-def _machine() -> list[str]:
-    """The rest of a description: what runs the program, and what made it."""
-    device = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
-    return [getattr(device, "platform", None) or jax.default_backend(), *_versions()]
+@contextlib.contextmanager
+def _without_writing_to_jax_cache() -> Iterator[None]:
+    """What JAX has read from its own cache cannot be written again: these are not there."""
+    name = "jax_persistent_cache_min_compile_time_secs"
+    before = getattr(jax.config, name)
+    jax.config.update(name, _NEVER)
+    try:
+        yield
+    finally:
+        jax.config.update(name, before)
+
+
+def _device() -> list[str]:
+    chosen = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
+    device = chosen if isinstance(chosen, jax.Device) else jax.devices(chosen)[0]
+    return [device.platform, device.device_kind]
 
 
 @functools.cache
-def _versions() -> tuple[str, ...]:
+def _surroundings() -> tuple[str, ...]:
+    """What made a program, and the processor, whose instructions it may use."""
     sources = hashlib.sha256()
     for path in sorted(_PACKAGE.rglob("*.py")):
-        sources.update(path.read_bytes())
+        if _COMPILES_NOTHING not in path.parents:
+            sources.update(path.read_bytes())
     packages = ("jax", "jaxlib", "equinox", "lineax", "optimistix")
-    return (sources.hexdigest(), *(f"{p} {version(p)}" for p in packages))
+    return (
+        sources.hexdigest(),
+        *(f"{p} {version(p)}" for p in packages),
+        os.environ.get("XLA_FLAGS", ""),
+        _processor(),
+    )
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return "".join(sorted({s for s in lines if s.startswith(("flags", "Features"))}))
+    except OSError:
+        # Then the same machine it is to be.
+        return " ".join(platform.uname())
 
 
 def _described(value: Any) -> Any:
@@ -146,8 +190,6 @@ def _described_tree(tree: Any) -> Iterator[Any]:
     builtin = kind in (tuple, list, dict, type(None))
     if not builtin and kind.__module__.partition(".")[0] != __package__:
         raise TypeError(f"not of this package: {kind!r}")
-    if ".py" in str(data):
-        raise TypeError(f"a lobe of a file: {data!r}")
     children = tree.children()
     own = data if isinstance(data, tuple | list) else () if data is None else (data,)
     plain = [_described(v) for v in own if type(v).__name__ != "_Missing" and v is not kind]

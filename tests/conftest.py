@@ -61,7 +61,7 @@ def compiled_as_users_do(request: pytest.FixtureRequest) -> Iterator[None]:
 @pytest.fixture(autouse=True, scope="module")
 def room_for_compiled_code() -> Iterator[None]:
     """Tests compile more than a process can hold."""
-    from fitting.compiled_code import make_room
+    from fitting.compiled import make_room
 
     yield
     make_room()

@@ -14,7 +14,7 @@ import numpy as np
 
 from data_formats import Measurement
 from fitting.by_name import own_settings
-from fitting.compiled_code import make_room
+from fitting.compiled import make_room
 from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions

@@ -1,0 +1,193 @@
+"""Compiled functions that another process finds again, and when it must not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from fitting import Model, from_angles, kept_programs
+from fitting.compiled import Compiled
+from fitting.uncertainty import Covariance
+
+
+class Somebodys(eqx.Module):
+    """What is not of this package: its source may be another one tomorrow."""
+
+    factor: float = eqx.field(static=True, default=2.0)
+
+
+class Counted:
+    """A function, and how often it was traced."""
+
+    def __init__(self, function=None):
+        self.traced = 0
+        self._function = function or (lambda a, b, kind: a * b if kind == "*" else a + b)
+        self.__module__, self.__qualname__ = __name__, "counted"
+        self.__name__ = "counted"
+
+    def __call__(self, *args):
+        self.traced += 1
+        return self._function(*args)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch):
+    """Programs are kept in an empty folder."""
+    monkeypatch.setattr(kept_programs, "_folder", tmp_path)
+    return tmp_path
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(folder.iterdir())
+
+
+def test_the_next_process_does_not_trace(folder):
+    a, b = np.arange(3.0, dtype=np.float32), jnp.asarray(2.0, dtype=jnp.float32)
+    first = Counted()
+    np.testing.assert_array_equal(Compiled(first, None)(a, b, "*"), [0, 2, 4])
+    assert first.traced == 1
+    assert len(_files(folder)) == 1
+    # What another process has: the same function, nothing compiled, the folder.
+    second = Counted()
+    again = Compiled(second, None)
+    np.testing.assert_array_equal(again(a + 1, b, "*"), [2, 4, 6])
+    np.testing.assert_array_equal(again(a, b, "*"), [0, 2, 4])
+    assert second.traced == 0
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        (np.ones(2, np.float32), jnp.float32(2), "*"),
+        (np.ones(3, np.int32), jnp.float32(2), "*"),
+        (np.ones(3, np.float32), jnp.ones(1, jnp.float32), "*"),
+        (np.ones(3, np.float32), jnp.float32(2), "+"),
+        (np.ones(3, np.float32), 2.0, "*"),
+        (np.ones(3, np.float32), 2, "*"),
+    ],
+    ids=["fewer", "integers", "other shape", "other word", "number", "whole number"],
+)
+def test_what_a_program_depends_on(folder, other):
+    Compiled(Counted(), None)(np.ones(3, np.float32), jnp.float32(2), "*")
+    counted = Counted()
+    out = Compiled(counted, None)(*other)
+    a, b, kind = other
+    np.testing.assert_array_equal(out, a * b if kind == "*" else a + b)
+    assert counted.traced == 1
+    assert len(_files(folder)) == 2
+
+
+def test_precision_is_part_of_it():
+    def half(a):
+        return a + jnp.asarray(0.1)
+
+    a = np.ones(2, np.float32)
+    for x64, kind in ((False, np.float32), (True, np.float64)):
+        with jax.enable_x64(x64):
+            counted = Counted(half)
+            out = Compiled(counted, None)(a.astype(kind))
+            assert out.dtype == kind
+            assert counted.traced == 1
+
+
+def test_compiler_options_are_part_of_it(folder):
+    from fitting.row_sums import FAST
+
+    for options in (None, FAST, None):
+        Compiled(Counted(), options)(np.ones(2), np.ones(2), "+")
+    assert len(_files(folder)) == 2
+
+
+def test_results_keep_their_types():
+    def solved(a, nothing):
+        return Covariance(a, a + 1, a), nothing
+
+    for _ in range(2):
+        covariance, nothing = Compiled(Counted(solved), None)(np.ones(2), None)
+        assert isinstance(covariance, Covariance)
+        assert nothing is None
+        np.testing.assert_array_equal(covariance.freedom, [2, 2])
+
+
+def test_bits_are_those_of_the_function():
+    model, geometry = Model("lambert + ggx"), from_angles([0.1, 0.9], 0.0, [0.3, 0.5], 2.0)
+    values = {n: np.asarray(v) for n, v in model.defaults().items()}
+
+    def evaluated(model, values, geometry):
+        return model(values, geometry)
+
+    with jax.enable_x64(True):
+        geometry = jax.tree.map(np.asarray, geometry)
+        plain = eqx.filter_jit(evaluated)(model, values, geometry)
+        for traced in (1, 0):
+            counted = Counted(evaluated)
+            kept = Compiled(counted, None)(model, values, geometry)
+            np.testing.assert_array_equal(kept, plain)
+            assert counted.traced == traced
+
+
+@pytest.mark.parametrize("damage", ["cut", "empty", "another"])
+def test_a_damaged_file_is_made_again(folder, damage):
+    a = np.ones(2)
+    Compiled(Counted(), None)(a, a, "+")
+    (path,) = _files(folder)
+    whole = path.read_bytes()
+    if damage == "another":
+        Compiled(Counted(), None)(a, a, "*")
+        (other,) = set(_files(folder)) - {path}
+        path.write_bytes(other.read_bytes())
+    else:
+        path.write_bytes(whole[: len(whole) // 2 if damage == "cut" else 0])
+    counted = Counted()
+    np.testing.assert_array_equal(Compiled(counted, None)(a, a, "+"), [2, 2])
+    assert counted.traced == 1
+    again = Counted()
+    np.testing.assert_array_equal(Compiled(again, None)(a, a, "+"), [2, 2])
+    assert again.traced == 0
+
+
+def test_a_folder_that_is_gone(folder, monkeypatch):
+    monkeypatch.setattr(kept_programs, "_folder", folder / "gone")
+    np.testing.assert_array_equal(Compiled(Counted(), None)(np.ones(2), 2.0, "*"), [2, 2])
+    assert not _files(folder)
+
+
+def test_programs_of_other_packages_are_not_kept(folder):
+    for _ in range(2):
+        counted = Counted(lambda own, a: own.factor * a)
+        out = Compiled(counted, None)(Somebodys(), np.ones(2))
+        np.testing.assert_array_equal(out, [2, 2])
+        assert counted.traced == 1
+    assert not _files(folder)
+
+
+def test_what_calls_other_code_is_not_kept(folder):
+    counted = Counted(jnp.linalg.eigvalsh)
+    np.testing.assert_allclose(Compiled(counted, None)(np.eye(2)), [1, 1])
+    assert not _files(folder)
+
+
+def test_within_another_compiled_function(folder):
+    inner = Compiled(Counted(), None)
+    out = jax.jit(lambda a: jax.grad(lambda x: jnp.sum(inner(x, x, "*")))(a))(np.ones(2))
+    np.testing.assert_array_equal(out, [2, 2])
+    assert not _files(folder)
+
+
+def test_making_room(monkeypatch):
+    from fitting import compiled
+
+    counted = Counted()
+    function = Compiled(counted, None)
+    function(np.ones(2), np.ones(2), "+")
+    monkeypatch.setattr(compiled, "_MANY", 0)
+    monkeypatch.setattr(compiled.jax, "clear_caches", lambda: None)
+    compiled.make_room()
+    assert not function._ready
+    np.testing.assert_array_equal(function(np.ones(2), np.ones(2), "+"), [2, 2])
+    assert counted.traced == 1
