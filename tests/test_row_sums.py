@@ -1,8 +1,9 @@
-"""Sums over the rows, made in two ways, are those of plain arrays."""
+"""Sums over the rows, made in three ways, are those of plain arrays."""
 
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import haste
 import jax
@@ -14,13 +15,14 @@ import synthetic
 from fitting import FitOptions, Model, objectives, row_sums
 from fitting.problem import prepare
 from fitting.reduced import Problem
+from fitting.row_sums import features, reductions
 from fitting.rows import select_rows
 
 CHANNELS = 11
 
 
 def problem(
-    expression: str, *, channels: int = CHANNELS, sigma: bool = False, **kwargs
+    expression: str, *, channels: int = CHANNELS, sigma: bool = False, **kwargs: Any
 ) -> Problem:
     """Of a noisy measurement, in more channels than one block has, and no multiple."""
     one = np.linspace(0.5, 1.0, channels)
@@ -57,7 +59,17 @@ def plain(p: Problem, u, a):
     return gram, np.einsum("cn,fn->cf", d * r, features), np.sum(r * r)
 
 
-@pytest.mark.parametrize("light", [0, 10**6], ids=["in blocks", "fused"])
+# Channels for which features are inlined, for which they are held,
+# and most sums in one loop.
+WAYS = {
+    "products": (0, 4, 0),
+    "held": (0, 4, 999),
+    "held for all": (0, 99, 9999),
+    "inlined": (99, 4, 9999),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(
     ("expression", "options"),
     [
@@ -69,14 +81,20 @@ def plain(p: Problem, u, a):
         ("lambert", {"objective": "l2"}),
     ],
 )
-def test_both_ways_are_the_sums_of_plain_arrays(monkeypatch, expression, options, light):
-    monkeypatch.setattr(row_sums, "_LIGHT", light)
+def test_all_ways_are_the_sums_of_plain_arrays(monkeypatch, expression, options, way):
+    at_once, held, most = WAYS[way]
+    monkeypatch.setattr(reductions, "_MOST_INLINED", at_once)
+    monkeypatch.setattr(reductions, "_MOST_HELD", held)
+    monkeypatch.setattr(reductions, "_MOST_SUMS", most)
     with jax.enable_x64(True):
         p = problem(expression, **options)
+        p = dataclasses.replace(p, chunk=p.kappa.size // 2)
         u = jnp.linspace(-0.7, 0.4, p.unknowns.n_shape)
         n_basis = sum(p.model.n_basis(i) for i in range(len(p.model.lobes)))
         a = np.random.default_rng(0).uniform(0.05, 0.3, (CHANNELS, n_basis))
-        assert (row_sums._listed_features(p, u) is not None) == bool(light)
+        assert reductions.all_at_once(p) == (way == "inlined")
+        assert reductions.some_at_once(p) == (way != "products")
+        assert features.inlinable(p, u) is not None
         run = jax.jit(row_sums.over_rows, compiler_options=row_sums.FAST)
         got = jax.device_get(run(p, u, jnp.asarray(a)))
         gram, gradient, cost = plain(p, u, a)
@@ -88,13 +106,11 @@ def test_both_ways_are_the_sums_of_plain_arrays(monkeypatch, expression, options
 
 
 def test_what_is_costly_or_differs_by_channel_is_not_inlined():
+    own: dict[str, Any] = {"fix": {"ggx.alpha": [0.2] * CHANNELS}}
     with jax.enable_x64(True):
-        for expression, options in (
-            ("lambert + student_t", {}),
-            ("lambert + ggx", {"fix": {"ggx.alpha": [0.2] * CHANNELS}}),
-        ):
+        for expression, options in (("lambert + student_t", {}), ("lambert + ggx", own)):
             p = problem(expression, objective="l2", **options)
-            assert row_sums._listed_features(p, jnp.zeros(p.unknowns.n_shape)) is None
+            assert features.inlinable(p, jnp.zeros(p.unknowns.n_shape)) is None
 
 
 def test_the_loop_of_the_solver_holds_nothing_of_the_size_of_the_rows():
@@ -115,7 +131,8 @@ def test_the_loop_of_the_solver_holds_nothing_of_the_size_of_the_rows():
         p = dataclasses.replace(p, chunk=4096)
         x = jnp.full((3, 3), 0.1)
         with haste.compiling(in_haste=False):
-            compiled = refine.lower(p, jnp.zeros(1), x).compile().compiled
+            lowered = refine.lower(p, jnp.zeros(1), x)  # pyright: ignore
+            compiled = lowered.compile().compiled
         analysis = compiled.memory_analysis()
     if analysis is None:
         pytest.skip("XLA has no memory analysis on this platform")

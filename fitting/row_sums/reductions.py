@@ -1,0 +1,152 @@
+"""The sums as operands of reductions: loops that write nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from fitting.geometry import Geometry
+from fitting.row_sums.features import listed, number
+from fitting.row_sums.rows import (
+    Data,
+    cut,
+    data_of,
+    geometry_of,
+    residual,
+    slope_is_shared,
+    sum_blocks,
+)
+from fitting.row_sums.sums import Sums, pairs, symmetric
+
+if TYPE_CHECKING:
+    from fitting.reduced import Problem
+
+# Lets XLA add in another order, without which its reductions are scalar loops on CPUs.
+# NaN and infinities still propagate.
+FAST = {"xla_cpu_enable_fast_math": True}
+# More accumulators in one loop than this gain nothing, and take long to compile.
+_MOST_SUMS = 170
+# Channels in one loop: for which features are inlined, and from which they are read.
+_MOST_INLINED, _MOST_HELD = 8, 4
+
+
+def all_at_once(problem: Problem) -> bool:
+    """Whether the sums of all channels are not too many for one loop."""
+    channels = problem.target.shape[0]
+    return channels <= _MOST_INLINED and _sums(problem, channels) <= _MOST_SUMS
+
+
+def some_at_once(problem: Problem) -> bool:
+    """Whether those of the channels are not for which features are `held` in a loop."""
+    return _sums(problem, _channels_held(problem)) <= _MOST_SUMS
+
+
+def _channels_held(problem: Problem) -> int:
+    return min(problem.target.shape[0], _MOST_HELD)
+
+
+def _sums(problem: Problem, channels: int) -> int:
+    n = number(problem)
+    products = 0 if slope_is_shared(problem) else n * (n + 1) // 2
+    return channels * (products + n + 1)
+
+
+def inlined(
+    problem: Problem, features: Callable[[Geometry], list[Array]], a: Array
+) -> Sums:
+    """All sums of all channels as one reduction over all rows."""
+    f, data = features(problem.geometry), data_of(problem)
+    common = _common(problem, f, data)
+    sums = _add_up([*common, *_of_channels(problem, f, data, a)])
+    by_channel = sums[len(common) :].reshape(a.shape[0], -1)
+    return _assembled(problem, sums[: len(common)], by_channel)
+
+
+def held(problem: Problem, u: Array, a: Array) -> Sums:
+    """Sums of a few channels at a time, over a block of rows after the other.
+
+    The features of the block are written, once for all channels.
+    """
+    n_channels, size = a.shape[0], _channels_held(problem)
+    count = math.ceil(n_channels / size)
+    # The last channels overlap those before: no copy of the data to fill them up.
+    begin = np.minimum(np.arange(count) * size, n_channels - size)
+
+    def of_block(first: Array | int) -> tuple[Array, Array]:
+        f = jax.lax.optimization_barrier(listed(problem, u, geometry_of(problem, first)))
+
+        def some(channel: Array | int) -> Array:
+            def own(v: Array) -> Array:
+                if v.shape[0] == 1:
+                    return v
+                return jax.lax.dynamic_slice_in_dim(v, channel, size, axis=0)
+
+            # Of the data as a whole, for the loops to read them where they are.
+            kappa, weight, target = data_of(problem)
+            parts = (cut(problem, v, first) for v in (kappa, own(weight), own(target)))
+            sums = _add_up(_of_channels(problem, f, Data(*parts), own(a)))
+            return sums.reshape(size, -1)
+
+        data = Data(*(cut(problem, v, first) for v in data_of(problem)))
+        common = _add_up(_common(problem, f, data))
+        if count == 1:
+            return some(0)[None], common
+        return jax.lax.map(some, jnp.asarray(begin)), common
+
+    groups, common = sum_blocks(problem, of_block)
+    c = np.arange(n_channels)
+    which = np.minimum(c // size, count - 1)
+    return _assembled(problem, common, groups[which, c - begin[which]])
+
+
+def _assembled(problem: Problem, common: Array, by_channel: Array) -> Sums:
+    n = number(problem)
+    half = common[None] if slope_is_shared(problem) else by_channel[:, : -n - 1]
+    return Sums(symmetric(half, n), by_channel[:, -n - 1 : -1], jnp.sum(by_channel[:, -1]))
+
+
+def _common(problem: Problem, features: Sequence[Array], data: Data) -> list[Array]:
+    """What is summed once for all channels, ``(n,)`` each."""
+    if not slope_is_shared(problem):
+        return []
+    return _products(features, data.weight[0] * data.kappa)
+
+
+def _of_channels(
+    problem: Problem, features: Sequence[Array], data: Data, a: Array
+) -> list[Array]:
+    """What is summed for every channel, one after the other, ``(n,)`` each."""
+    terms: list[Array] = []
+    for c in range(a.shape[0]):
+        f = sum(a[c, j] * features[j] for j in range(a.shape[1]))
+        weight = data.weight[min(c, data.weight.shape[0] - 1)]
+        here = Data(data.kappa, weight, data.target[c])
+        r, d = residual(problem, jnp.asarray(f), here)
+        if not slope_is_shared(problem):
+            terms += _products(features, d)
+        terms += [(d * r) * f for f in features] + [r * r]
+    return terms
+
+
+def _products(features: Sequence[Array], slope: Array) -> list[Array]:
+    steep = [slope * f for f in features]
+    return [steep[i] * steep[j] for i, j in zip(*pairs(len(steep)), strict=True)]
+
+
+def _add_up(terms: Sequence[Array]) -> Array:
+    """The sums over the only axis of arrays, in one pass."""
+    if not terms:
+        return jnp.zeros(0)
+    terms = jnp.broadcast_arrays(*terms)
+    zeros = tuple(jnp.zeros((), t.dtype) for t in terms)
+
+    def add(left: tuple[Array, ...], right: tuple[Array, ...]) -> tuple[Array, ...]:
+        return tuple(p + q for p, q in zip(left, right, strict=True))
+
+    return jnp.stack(jax.lax.reduce(tuple(terms), zeros, add, (0,)))
