@@ -24,11 +24,42 @@ _ABREAST, _SPARE = 128, 16
 BATCH = 8 * (_ABREAST - _SPARE)
 _STARTS = 2
 _LARGEST = 1e100
+# Where there are wide registers, there are more of them: enough for all the sums of a loop.
+_OPTIONS = {**row_sums.FAST, "xla_cpu_prefer_vector_width": 512}
 
 
-def _compiled(function: Callable) -> Callable[..., Any]:
-    """Compiled with sums reassociated: in another order, the same for every texel."""
-    return eqx.filter_jit(function, compiler_options=row_sums.FAST)  # pyright: ignore
+class Compiled:
+    """Calls functions of a task, compiled with sums reassociated: in another order, the
+    same for every texel.
+
+    The task is taken apart once and not at every call, which would cost as much as fits.
+    """
+
+    def __init__(self, task: Task):
+        leaves, self._tree = jax.tree.flatten(task)
+        are = [eqx.is_array(v) for v in leaves]
+        self._others = tuple(None if a else v for a, v in zip(are, leaves, strict=True))
+        self._arrays = [jnp.asarray(v) for a, v in zip(are, leaves, strict=True) if a]
+        self._found: dict[Callable, Callable] = {}
+        self.task = task
+
+    def __call__(self, function: Callable, *arguments: Any, **static: Any) -> Any:
+        """``function(task, *arguments, **static)``."""
+        found = self._found.get(function)
+        if found is None:
+            found = _jitted(function, self._tree, self._others)
+            self._found[function] = found
+        return found(self._arrays, *arguments, **static)
+
+
+@functools.lru_cache(maxsize=64)
+def _jitted(function: Callable, tree: Any, others: tuple[Any, ...]) -> Callable:
+    def call(arrays: list[Array], *arguments: Any, **static: Any) -> Any:
+        known = iter(arrays)
+        leaves = [next(known) if v is None else v for v in others]
+        return function(jax.tree.unflatten(tree, leaves), *arguments, **static)
+
+    return jax.jit(call, static_argnames="own_weights", compiler_options=_OPTIONS)
 
 
 class Data(NamedTuple):
@@ -38,78 +69,74 @@ class Data(NamedTuple):
     sigma: np.ndarray | None
 
 
-def _known(data: Any) -> Array:
-    """Which values are, and have an uncertainty if there are any."""
+class Texels(NamedTuple):
+    """A batch as descents take it: weights ``heavy (t, w, n)``, with a leading 1 for those
+    of all texels, ``values (t, c, n)`` of the rows that count, padded, and how many values
+    are known ``used (t, c)``."""
 
-    def is_usable(v: Array) -> Array:
-        return jnp.abs(v.astype(jnp.float64)) < _LARGEST
-
-    known = is_usable(data.values)
-    if data.sigma is not None:
-        known = known & (data.sigma > 0) & is_usable(data.sigma)
-    return known
+    heavy: Array
+    values: Array
+    used: Array
 
 
-@_compiled
-def counted(task: Task, data: Data) -> Array:
-    """How many values of every texel are known and count, ``(t, c)``."""
-    counts = (task.heavy > 0)[:, : task.rows.size].T
-    return jnp.sum(_known(data)[:, task.rows] & counts, axis=1)
-
-
-def _arranged(task: Task, data: Any, own_weights: bool) -> tuple[Array, Array]:
-    """Weights and values ``(t, c, n)``; of weights, a leading 1 for all texels."""
+def arranged(task: Task, data: Data, *, own_weights: bool) -> Texels:
+    """With weights of their own where not every value of a texel is known."""
     padding = ((0, 0), (0, 0), (0, task.heavy.shape[-1] - task.rows.size))
 
-    def rows_last(v: Array) -> Array:
-        rows = jnp.swapaxes(v[:, task.rows], 1, 2).astype(task.heavy.dtype)
-        return jnp.pad(rows, padding)
+    def rows_last(v: Any) -> Array:
+        rows = jnp.swapaxes(v[:, task.rows], 1, 2)
+        return jnp.pad(rows.astype(task.heavy.dtype), padding)
 
-    if not own_weights:
-        return task.heavy[None], rows_last(data.values)
-    known = _known(data)
-    heavy = task.heavy * rows_last(known)
+    def is_usable(v: Array) -> Array:
+        return jnp.abs(v) < _LARGEST
+
+    values, heavy = rows_last(data.values), task.heavy
+    known = is_usable(values)
     if data.sigma is not None:
-        heavy = heavy / (rows_last(jnp.where(known, data.sigma, 1.0)) + (heavy == 0))
-    return heavy, rows_last(jnp.where(known, data.values, 0.0))
+        sigma = rows_last(data.sigma)
+        known = known & (sigma > 0) & is_usable(sigma)
+        heavy = heavy / jnp.where(known, sigma, 1.0)
+    known = known & (task.heavy > 0)
+    used = jnp.sum(known, axis=-1, dtype=jnp.int32)
+    if not own_weights:
+        return Texels(heavy[None], values, used)
+    return Texels(jnp.where(known, heavy, 0.0), jnp.where(known, values, 0.0), used)
 
 
-@_compiled
-def scanned(task: Task, data: Data, own_weights: bool) -> Starts:
-    def some(part: Data) -> Starts:
-        return scan(task, *_arranged(task, part, own_weights), _STARTS)
+def scanned(task: Task, texels: Texels) -> tuple[Starts, State]:
+    """Where they begin, and the states there."""
 
-    return _abreast(some, data)
+    def some(part: tuple[Array, ...]) -> tuple[Starts, State]:
+        heavy, values = (texels.heavy, *part) if len(part) == 1 else part
+        starts = scan(task, heavy, values, _STARTS)
+        return starts, begun(task, starts.u[:, 0], starts.x[:, 0])
+
+    shared = texels.heavy.shape[0] == 1
+    return _abreast(some, (texels.values,) if shared else (texels.heavy, texels.values))
 
 
-@_compiled
 def begun(task: Task, u: Array, x: Array) -> State:
+    """States before descents from ``u (t, k)`` and ``x (t, c, m)``."""
     return jax.vmap(functools.partial(begin, task))(u, x)
 
 
-@_compiled
-def gone_on(task: Task, data: Data, state: State, own_weights: bool, until: Array) -> State:
-    one = functools.partial(descend, task, until=until)
-    return _each(one, task, data, own_weights, state)
+def gone_on(task: Task, texels: Texels, state: State, until: Array) -> State:
+    """After ``until`` steps in all, or at the end."""
+    return _each(functools.partial(descend, task, until=until), texels, state)
 
 
-@_compiled
-def finished(
-    task: Task, data: Data, state: State, used: Array, own_weights: bool
-) -> Outcome:
-    return _each(functools.partial(outcome, task), task, data, own_weights, state, used)
+def finished(task: Task, texels: Texels, state: State) -> Outcome:
+    """What is known at the ends."""
+    return _each(functools.partial(outcome, task), texels, state, texels.used)
 
 
-def _each(function: Any, task: Task, data: Data, own_weights: bool, *others: Any) -> Any:
+def _each(function: Any, texels: Texels, *others: Any) -> Any:
     """``function(heavy, values, *others)`` of every texel."""
-
-    def some(part: tuple) -> Any:
-        heavy, values = _arranged(task, part[0], own_weights)
-        if own_weights:
-            return jax.vmap(function)(heavy, values, *part[1:])
-        return jax.vmap(functools.partial(function, heavy[0]))(values, *part[1:])
-
-    return _abreast(some, (data, *others))
+    if texels.heavy.shape[0] == 1:
+        one = functools.partial(function, texels.heavy[0])
+        return _abreast(lambda part: jax.vmap(one)(*part), (texels.values, *others))
+    both = (texels.heavy, texels.values, *others)
+    return _abreast(lambda part: jax.vmap(function)(*part), both)
 
 
 def _abreast(function: Any, arrays: Any) -> Any:

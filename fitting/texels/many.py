@@ -12,33 +12,32 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from fitting.texels.abreast import (
     BATCH,
+    Compiled,
     Data,
+    Texels,
+    arranged,
     begun,
-    counted,
     finished,
     gone_on,
     scanned,
 )
 from fitting.texels.descent import State
+from fitting.texels.outcome import Outcome
+from fitting.texels.scan import Starts
 from fitting.texels.task import Task
 
-_FEW_STEPS = 5
+# Where starts are good, and else.
+_FIRST_STEPS, _FEW_STEPS = 1, 5
 _MAX_STEPS = 200
 # A second start is refined where the scan does not tell it from the first by this factor.
 _FAR_COSTLIER = 4.0
 _SAME_MINIMUM = 1e-6
 # Beyond this the map onto a parameter's support is flat: from inside once more.
 _FLAT, _INSIDE = 7.6, 2.0
-
-
-class _How(NamedTuple):
-    """Whether texels have weights of their own, and whether float32 comes first."""
-
-    own_weights: bool
-    single_first: bool
 
 
 def fit_chunk(
@@ -54,118 +53,147 @@ def fit_chunk(
     ``single_first``: descend in float32 and then on in float64, for GPUs that are slow at
     the latter. Call with x64 enabled.
     """
-    data = Data(values, sigma)
-    used = _in_batches(lambda some: counted(task, some), data)
-    complete = np.all(used == np.asarray(task.used), axis=-1)
-    alike = complete & (sigma is None)
-    out: dict[str, np.ndarray] = {}
-    for own_weights in (False, True):
-        texels = np.flatnonzero(alike != own_weights)
-        if texels.size:
-            how = _How(own_weights, single_first)
-            part = _fit(task, _taken(data, texels), how, used[texels])
-            for name, v in part.items():
-                whole = out.setdefault(
-                    name, np.zeros((used.shape[0], *v.shape[1:]), v.dtype)
-                )
-                whole[texels] = v
+    run, data = Compiled(task), Data(values, sigma)
+    out, complete = _fit(run, data, own_weights=sigma is not None, single=single_first)
+    other = np.flatnonzero(~complete)
+    if other.size and sigma is None:
+        some = _taken(data, other)
+        found, _ = _fit(run, some, own_weights=True, single=single_first)
+        for name, v in found.items():
+            out[name][other] = v
     return out
 
 
-def _fit(task: Task, data: Data, how: _How, used: np.ndarray) -> dict[str, np.ndarray]:
-    """Texels whose weights are their own, or those of all."""
-    starts = _in_batches(lambda some: scanned(task, some, how.own_weights), data)
+def _fit(
+    run: Compiled, data: Data, *, own_weights: bool, single: bool
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Of texels whose weights are their own, or those of all; and which are complete, as
+    the latter have to be."""
+    task = run.task
+    few = np.asarray(_FIRST_STEPS if task.even else _FEW_STEPS)
+
+    def first(some: Data) -> tuple[Outcome, State, Starts, Array]:
+        texels = run(arranged, some, own_weights=own_weights)
+        starts, state = run(scanned, texels)
+        if single:
+            state = _roughly(run, texels, state, few)
+        state = run(gone_on, texels, state, few)
+        return run(finished, texels, state), state, starts, texels.used
+
+    outcome, state, starts, used = _in_batches(first, data)
+    complete = np.all(used == np.asarray(task.used), axis=-1)
+    ratio = np.full(complete.size, np.nan)
     # A second start is refined only where it may lead to something better.
-    second = np.flatnonzero(starts.cost[:, 1] < _FAR_COSTLIER * starts.cost[:, 0])
-    state = _refined(task, data, how, starts.u[:, 0], starts.x[:, 0])
-    best = np.where(np.isfinite(state.blocks.cost), state.blocks.cost, np.inf)
-    ratio = np.full(best.size, np.nan)
-    if second.size:
-        other = _refined(
-            task,
-            _taken(data, second),
-            how,
-            starts.u[second, 1],
-            starts.x[second, 1],
-        )
-        costs = np.stack([best[second], other.blocks.cost])
-        costs = np.where(np.isfinite(costs), costs, np.inf)
-        _replaced(state, second, other, costs[1] < costs[0])
-        low, high = costs.min(axis=0), costs.max(axis=0)
-        apart = np.isfinite(high) & (high > low * (1.0 + _SAME_MINIMUM)) & (low > 0)
-        ratio[second[apart]] = high[apart] / low[apart]
-    found = _in_batches(
-        lambda some, s, n: finished(task, some, s, n, how.own_weights), data, state, used
-    )
-    return {**found._asdict(), "runner_up": ratio}
+    second = starts.cost[:, 1] < _FAR_COSTLIER * starts.cost[:, 0]
+    left = ~state.done | second | _flat(task, state).any(axis=1)
+    rest = np.flatnonzero(left if own_weights else left & complete)
+    if rest.size:
+        some = _Rest(run, _taken(data, rest), own_weights)
+        new = some.refined(_taken(state, rest))
+        ratio[rest] = some.best_of_two(new, _taken(starts, rest), second[rest])
+        _replace(outcome, rest, some.finished(new))
+    return {**outcome._asdict(), "runner_up": ratio}, complete
 
 
-def _refined(task: Task, data: Data, how: _How, u: np.ndarray, x: np.ndarray) -> State:
-    """The ends of descents from ``u (t, k)`` and ``x (t, c, m)``.
+class _Rest(NamedTuple):
+    """Texels that take longer than most."""
 
-    Once more from inside where a shape ended on the flat part of its support's map.
-    """
-    state = _descended(task, data, how, u, x)
+    run: Compiled
+    data: Data
+    own_weights: bool
+
+    def refined(self, state: State) -> State:
+        """The ends of descents; once more from inside where a shape ended on the flat part
+        of its support's map."""
+        state = self._descended(state)
+        flat = _flat(self.run.task, state)
+        again = np.flatnonzero(flat.any(axis=1))
+        if again.size:
+            u = np.where(flat, np.sign(state.u) * _INSIDE, state.u)[again]
+            some = self._replace(data=_taken(self.data, again))
+            new = some._descended(_begun(self.run, u, state.blocks.x[again]))
+            _replace(state, again, new, new.blocks.cost < state.blocks.cost[again])
+        return state
+
+    def best_of_two(self, state: State, starts: Starts, where: np.ndarray) -> np.ndarray:
+        """Put the ends from second starts in where they are better; gives the costs of
+        what was found besides, over those of the best."""
+        ratio = np.full(where.size, np.nan)
+        index = np.flatnonzero(where)
+        if index.size:
+            some = self._replace(data=_taken(self.data, index))
+            u, x = starts.u[index, 1], starts.x[index, 1]
+            other = some.refined(_begun(self.run, u, x))
+            costs = np.stack([state.blocks.cost[index], other.blocks.cost])
+            costs = np.where(np.isfinite(costs), costs, np.inf)
+            _replace(state, index, other, costs[1] < costs[0])
+            low, high = costs.min(axis=0), costs.max(axis=0)
+            apart = np.isfinite(high) & (high > low * (1.0 + _SAME_MINIMUM)) & (low > 0)
+            ratio[index[apart]] = high[apart] / low[apart]
+        return ratio
+
+    def finished(self, state: State) -> Outcome:
+        """What is known of them at the end."""
+
+        def finish(data: Data, some: State) -> Outcome:
+            texels = self.run(arranged, data, own_weights=self.own_weights)
+            return self.run(finished, texels, some)
+
+        return _in_batches(finish, self.data, state)
+
+    def _descended(self, state: State) -> State:
+        waiting = np.flatnonzero(~state.done)
+        for until in range(_FEW_STEPS, _MAX_STEPS + 1, _FEW_STEPS):
+            if not waiting.size:
+                break
+
+            def go_on(data: Data, some: State, until: int = until) -> State:
+                texels = self.run(arranged, data, own_weights=self.own_weights)
+                return self.run(gone_on, texels, some, np.asarray(until))
+
+            some = _taken(self.data, waiting), _taken(state, waiting)
+            new = _in_batches(go_on, *some)
+            _replace(state, waiting, new)
+            waiting = waiting[~new.done]
+        return state
+
+
+def _flat(task: Task, state: State) -> np.ndarray:
+    """Which shapes ``(t, k)`` are where a map onto a support is flat."""
     periodic = np.array([s == "periodic" for s in task.problem.unknowns.scales], dtype=bool)
-    stuck = (np.abs(state.u) > _FLAT) & ~periodic
-    again = np.flatnonzero(stuck.any(axis=1))
-    if again.size:
-        u = np.where(stuck, np.sign(state.u) * _INSIDE, state.u)[again]
-        some = _taken(data, again)
-        new = _descended(task, some, how, u, state.blocks.x[again])
-        _replaced(state, again, new, new.blocks.cost < state.blocks.cost[again])
-    return state
+    return (np.abs(state.u) > _FLAT) & ~periodic
 
 
-def _descended(task: Task, data: Data, how: _How, u: Any, x: Any) -> State:
-    """The ends of descents from ``u (t, k)`` and ``x (t, c, m)``."""
-    if how.single_first:
-        # A few steps, since rounding would hide the end.
-        rough = _in_precision(
-            task, data, how.own_weights, u, x, kind=jnp.float32, most=_FEW_STEPS
-        )
-        usable = np.isfinite(rough.blocks.cost)
-        u = np.where(usable[:, None], rough.u, u)
-        x = np.where(usable[:, None, None], rough.blocks.x, x)
-    return _in_precision(
-        task, data, how.own_weights, u, x, kind=jnp.float64, most=_MAX_STEPS
-    )
+def _roughly(run: Compiled, texels: Texels, state: State, few: Any) -> State:
+    """The beginning of a descent in float64 where one in float32 ended.
+
+    That has few steps, since rounding would hide the end.
+    """
+    single = Compiled(jax.tree.map(_single, run.task))
+    rough = single(gone_on, *jax.tree.map(_single, (texels, state)), few)
+    usable = jnp.isfinite(rough.blocks.cost)
+    u = jnp.where(usable[:, None], rough.u, state.u)
+    x = jnp.where(usable[:, None, None], rough.blocks.x, state.blocks.x)
+    return run(begun, u.astype(state.u.dtype), x.astype(state.u.dtype))
 
 
-def _in_precision(
-    task: Task, data: Data, own_weights: bool, u: Any, x: Any, *, kind: Any, most: int
-) -> State:
-    """Descents in one precision, of as many steps at most."""
-    u, x = np.asarray(u, kind), np.asarray(x, kind)
-    task = jax.tree.map(lambda v: v.astype(kind) if _is_real(v) else v, task)
-    state = _in_batches(lambda u, x: begun(task, u, x), u, x)
-    waiting = np.arange(u.shape[0])
-    for until in range(_FEW_STEPS, most + 1, _FEW_STEPS):
-        limit = jnp.asarray(until)
-        part = _in_batches(
-            lambda some, s, n=limit: gone_on(task, some, s, own_weights, n),
-            _taken(data, waiting),
-            _taken(state, waiting),
-        )
-        _replaced(state, waiting, part, np.ones(waiting.size, dtype=bool))
-        waiting = waiting[~part.done]
-        if not waiting.size:
-            break
-    return state
+def _single(v: Any) -> Any:
+    return v.astype(jnp.float32) if jnp.issubdtype(v.dtype, jnp.floating) else v
 
 
-def _is_real(v: Any) -> bool:
-    return jnp.issubdtype(v.dtype, jnp.floating)
+def _begun(run: Compiled, u: Any, x: Any) -> State:
+    """The states before descents from ``u (t, k)`` and ``x (t, c, m)``."""
+    return _in_batches(lambda *some: run(begun, *some), u, x)
 
 
 def _taken(arrays: Any, index: np.ndarray) -> Any:
     return jax.tree.map(lambda v: v[index], arrays)
 
 
-def _replaced(state: State, index: np.ndarray, new: State, where: Any) -> None:
-    """Put the chosen ones of new states in the places of the old ones."""
-    for whole, some in zip(jax.tree.leaves(state), jax.tree.leaves(new), strict=True):
-        whole[index[where]] = some[where]
+def _replace(whole: Any, index: np.ndarray, new: Any, where: Any = ...) -> None:
+    """Put new arrays, or the chosen ones of them, in the places of the old ones."""
+    for old, some in zip(jax.tree.leaves(whole), jax.tree.leaves(new), strict=True):
+        old[index[where]] = some[where]
 
 
 def _in_batches(function: Any, *arrays: Any) -> Any:
@@ -175,8 +203,8 @@ def _in_batches(function: Any, *arrays: Any) -> Any:
     for first in range(0, count, BATCH):
         last = min(first + BATCH, count)
         batch = jax.tree.map(lambda v, a=first, b=last: _filled(v[a:b]), arrays)
-        out = jax.device_get(function(*batch))
-        parts.append(jax.tree.map(lambda v, n=last - first: v[:n], out))
+        out = function(*batch)
+        parts.append(jax.tree.map(lambda v, n=last - first: np.asarray(v)[:n], out))
     return jax.tree.map(lambda *v: np.concatenate(v), *parts)
 
 

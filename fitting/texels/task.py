@@ -23,7 +23,8 @@ from fitting.texels.box import Box, make_box
 
 # So that reductions over rows have no remainder.
 _ROWS_AT_ONCE = 8
-_APART = 0.7
+# Candidates of one shape unknown, close enough for polynomials between them.
+_EVEN = 48
 _OFF = {"robust": False, "per_channel_shape": False, "energy": 0, "reciprocity": 0}
 _LINEAR = tuple(name for name, o in OBJECTIVES.items() if o.linear)
 
@@ -33,19 +34,21 @@ class Task(eqx.Module):
 
     ``problem`` is that of a texel, whose values are not looked at. A residual is ``heavy
     (f - y)``, ``heavy (1 or c, n)`` in the fit's own weights. ``points (p, k)`` are shapes
-    to begin from, ``apart (p, p)`` tells which of them are far from each other. At these
+    to begin from, ``even``ly apart if that is one unknown. At these
     the model is ``offset + columns x``, linearised at ``x = 0``: ``columns (d, m, p, n)``
-    and ``offset (d, p, n)`` for all channels alike (d = 1) or not. Where amplitudes are
-    linear they are ``constant (c, b) + mixing x``.
+    and ``offset (d, p, n)`` for all channels alike (d = 1) or not; ``moving`` tells which
+    columns depend on the shape. Where amplitudes are linear they are ``constant (c, b) +
+    mixing x``.
     """
 
     problem: Problem
     box: Box
     heavy: Float[Array, "w n"]
     points: Float[Array, "p k"]
-    apart: Array
     columns: Float[Array, "d m p n"]
     offset: Float[Array, "d p n"]
+    even: bool = eqx.field(static=True)
+    moving: tuple[bool, ...] = eqx.field(static=True)
     shifted: bool = eqx.field(static=True)
     n_basis: int = eqx.field(static=True)
     mixing: tuple[tuple[float, ...], ...] | None = eqx.field(static=True)
@@ -105,18 +108,22 @@ def make_task(
     n = rows.index.size
     problem = _first_rows(problem, -(-n // _ROWS_AT_ONCE) * _ROWS_AT_ONCE)
     points = candidates(problem)
+    even = points.shape[1] == 1
+    if even:
+        points = np.linspace(points[0], points[-1], _EVEN)
     columns, offset = _linearised(problem, jnp.asarray(points))
     n_basis, mixing, constant = _amplitudes(problem)
-    far = np.max(np.abs(points[:, None] - points[None]), axis=-1, initial=0.0)
     shifted = bool(np.any(np.asarray(offset)))
+    moves = np.any(np.asarray(columns) != np.asarray(columns)[:, :, :1], axis=(0, 2, 3))
     return Task(
         problem=problem,
         box=make_box(problem.unknowns),
         heavy=problem.weight * problem.kappa,
         points=jnp.asarray(points),
-        apart=jnp.asarray(far > _APART),
         columns=columns,
         offset=offset,
+        even=even,
+        moving=tuple(moves.tolist()),
         shifted=shifted,
         n_basis=n_basis,
         mixing=mixing,
