@@ -18,19 +18,20 @@ from __future__ import annotations
 import dataclasses
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 from jaxtyping import Array, Float
 
-from fitting import qp, reduced
+from fitting import reduced, row_sums
+from fitting.compiled import compiled
 from fitting.reduced import Problem
 from fitting.solve import Solution
 
 _ON_BOUND = 1e-9
 _NOISE_STEPS = 4
+_RIDGE = 1e-14
 
 
 class Covariance(NamedTuple):
@@ -65,11 +66,10 @@ def covariance(problem: Problem, end: Solution) -> Covariance:
     for i in range(c):
         own = slice(i * m, (i + 1) * m)
         bread[own, own] += inverse[i]
-    noise = jnp.asarray([1.0, 1.0])
-    for _ in range(_NOISE_STEPS):
-        noise = _fitted_noise(problem, u, x, noise)
+    noise = _fitted_noise(problem, u, x)
     matrix, first, second = (
-        np.asarray(v) for v in _moments(problem, u, x, jnp.asarray(bread), noise)
+        np.asarray(v)
+        for v in _moments(problem, u, x, jnp.asarray(bread), jnp.asarray(noise))
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         freedom = np.where(second > 0, np.maximum(first * (first / second), 1.0), np.inf)
@@ -78,7 +78,7 @@ def covariance(problem: Problem, end: Solution) -> Covariance:
     return Covariance(matrix, freedom, active, penalty)
 
 
-@eqx.filter_jit
+@compiled(row_sums.FAST)
 def _data_blocks(
     problem: Problem, u: Float[Array, " k"], x: Float[Array, "c m"]
 ) -> reduced.Blocks:
@@ -89,34 +89,52 @@ def _data_blocks(
     return reduced.evaluate(plain, u, x)
 
 
-@eqx.filter_jit
-def _fitted_noise(
+def _fitted_noise(problem: Problem, u: Array, x: Array) -> np.ndarray:
+    """Relative and absolute noise variance: ``r^2 ~ noise[0] (d f)^2 + noise[1] d^2``.
+
+    By iteratively weighted least squares; the weights come from the noise before.
+    """
+    noise = np.ones(2)
+    for _ in range(_NOISE_STEPS):
+        a, b, c, *right = np.asarray(_noise_sums(problem, u, x, jnp.asarray(noise)))
+        noise = _not_negative(np.array([[a, b], [b, c]]), np.array(right))
+    return noise
+
+
+@compiled(row_sums.FAST)
+def _noise_sums(
     problem: Problem,
     u: Float[Array, " k"],
     x: Float[Array, "c m"],
-    noise: Float[Array, " t"],
-) -> Float[Array, " t"]:
-    """Relative and absolute noise variance: ``r^2 ~ noise[0] (d f)^2 + noise[1] d^2``.
+    noise: Float[Array, 2],
+) -> Float[Array, 5]:
+    """Upper half of the normal matrix of the noise's two variances, and its right side."""
 
-    One step of iteratively weighted least squares; the weights come from ``noise``.
-    """
-
-    def sums(f: Array, r: Array, d: Array, *_: Array) -> tuple[Array, ...]:
+    def sums(f: Array, r: Array, d: Array, *_: Array) -> tuple[Array]:
         relative, absolute = (d * f) ** 2, d**2
         expected = noise[0] * relative + noise[1] * absolute
-        weight = jnp.where(
-            expected > 0, 1.0 / jnp.where(expected > 0, expected, 1.0) ** 2, 0.0
-        )
-        design = jnp.stack([relative, absolute]).reshape(2, -1)
-        weighted = design * weight.ravel()
-        return weighted @ design.T, weighted @ (r**2).ravel()
+        some = expected > 0
+        weight = jnp.where(some, 1.0 / jnp.where(some, expected, 1.0) ** 2, 0.0)
+        left, right = weight * relative, weight * absolute
+        terms = (left * relative, left * absolute, right * absolute)
+        return (row_sums.add_up([*terms, left * r**2, right * r**2]),)
 
-    matrix, right = reduced.sum_over_rows(problem, u, x, sums)
-    limits = jnp.zeros((1, 2), dtype=right.dtype)
-    return qp.solve(matrix[None], right[None], jnp.eye(2), limits).x[0]
+    (total,) = reduced.sum_over_rows(problem, u, x, sums)
+    return total
 
 
-@eqx.filter_jit
+def _not_negative(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The two unknowns above 0 that minimise ``x' A x / 2 - b' x``, where ``b`` is."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    unit = matrix * np.outer(scale, scale) + _RIDGE * np.eye(2)
+    b = right * scale
+    x = np.linalg.solve(unit, b)
+    if np.min(x) < 0:
+        x = np.where(np.arange(2) == np.argmax(b), b, 0.0)
+    return x * scale
+
+
+@compiled()
 def _moments(
     problem: Problem,
     u: Float[Array, " k"],
@@ -183,5 +201,5 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
     diagonal = np.diag(matrix)
     floor = max(1e-30 * float(diagonal.max()), 1e-100)
     scale = 1.0 / np.sqrt(np.maximum(diagonal, floor))
-    unit = matrix * np.outer(scale, scale) + 1e-14 * np.eye(scale.size)
+    unit = matrix * np.outer(scale, scale) + _RIDGE * np.eye(scale.size)
     return np.linalg.inv(unit) * np.outer(scale, scale)

@@ -15,12 +15,13 @@ to the same sums; `over_rows` takes the first that does:
 
 from fitting.row_sums.features import dependents
 from fitting.row_sums.passes import by_function, linear_moments, of_functions, over_rows
-from fitting.row_sums.reductions import FAST
+from fitting.row_sums.reductions import FAST, add_up
 from fitting.row_sums.sums import Sums
 
 __all__ = (
     "FAST",
     "Sums",
+    "add_up",
     "by_function",
     "dependents",
     "linear_moments",

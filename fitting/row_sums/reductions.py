@@ -63,7 +63,7 @@ def inlined(
     """All sums of all channels as one reduction over all rows."""
     f, data = features(problem.geometry), data_of(problem)
     common = _common(problem, f, data)
-    sums = _add_up([*common, *_of_channels(problem, f, data, a)])
+    sums = add_up([*common, *_of_channels(problem, f, data, a)])
     by_channel = sums[len(common) :].reshape(a.shape[0], -1)
     return _assembled(problem, sums[: len(common)], by_channel)
 
@@ -90,11 +90,11 @@ def held(problem: Problem, u: Array, a: Array) -> Sums:
             # Of the data as a whole, for the loops to read them where they are.
             kappa, weight, target = data_of(problem)
             parts = (cut(problem, v, first) for v in (kappa, own(weight), own(target)))
-            sums = _add_up(_of_channels(problem, f, Data(*parts), own(a)))
+            sums = add_up(_of_channels(problem, f, Data(*parts), own(a)))
             return sums.reshape(size, -1)
 
         data = Data(*(cut(problem, v, first) for v in data_of(problem)))
-        common = _add_up(_common(problem, f, data))
+        common = add_up(_common(problem, f, data))
         if count == 1:
             return some(0)[None], common
         return jax.lax.map(some, jnp.asarray(begin)), common
@@ -139,8 +139,8 @@ def _products(features: Sequence[Array], slope: Array) -> list[Array]:
     return [steep[i] * steep[j] for i, j in zip(*pairs(len(steep)), strict=True)]
 
 
-def _add_up(terms: Sequence[Array]) -> Array:
-    """The sums over the only axis of arrays, in one pass."""
+def add_up(terms: Sequence[Array]) -> Array:
+    """The sums over all axes of arrays, ``(terms,)``, in one pass."""
     if not terms:
         return jnp.zeros(0)
     terms = jnp.broadcast_arrays(*terms)
@@ -149,4 +149,4 @@ def _add_up(terms: Sequence[Array]) -> Array:
     def add(left: tuple[Array, ...], right: tuple[Array, ...]) -> tuple[Array, ...]:
         return tuple(p + q for p, q in zip(left, right, strict=True))
 
-    return jnp.stack(jax.lax.reduce(tuple(terms), zeros, add, (0,)))
+    return jnp.stack(jax.lax.reduce(tuple(terms), zeros, add, range(terms[0].ndim)))
