@@ -10,9 +10,9 @@ import numpy as np
 import optimistix as optx
 import pytest
 import synthetic
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, nnls
 
-from fitting import padding, problem, reduced, solve, starts
+from fitting import padding, problem, reduced, solve, starts, uncertainty
 from fitting.model import Model
 from fitting.objectives import OBJECTIVES, transform
 from fitting.options import FitOptions
@@ -207,3 +207,13 @@ def test_masked_values_do_not_count(noisy):
         a, b = solved(prepared(masked)), solved(prepared(ruined))
     assert float(a.cost) == float(b.cost)
     np.testing.assert_array_equal(a.x, b.x)
+
+
+def test_variances_of_the_noise_are_those_of_scipys_non_negative_least_squares():
+    rng = np.random.default_rng(3)
+    for wanted in ([0.3, 0.2], [0.5, -0.4], [-0.3, 0.6], [0.0, 0.0]):
+        design = rng.uniform(0.1, 1.0, (40, 2)) * [1.0, 1e-6]
+        r2 = np.maximum(design @ (wanted * np.array([1.0, 1e6])), 0.0)
+        r2 += 0.01 * rng.uniform(size=r2.size)
+        found = uncertainty._not_negative(design.T @ design, design.T @ r2)
+        np.testing.assert_allclose(found, nnls(design, r2)[0], rtol=1e-8, atol=1e-12)
