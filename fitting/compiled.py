@@ -63,6 +63,10 @@ class Compiled(Generic[_P, _T]):
             run = self._ready[key] = self._made_ready(key, leaves)
         return run(*arrays) if run is not self._jitted else run(*args, **kwargs)
 
+    def lower(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
+        """The program as `jax.jit` lowers it, to look into."""
+        return self._jitted.lower(*args, **kwargs)
+
     def forget(self) -> None:
         """What was read or compiled; what is needed is read again."""
         self._ready.clear()

@@ -198,12 +198,12 @@ def _polar_angles(g: geometry.Geometry, size: int, model: Model):
     room = max(16, 1 << (first.size - 1).bit_length())
     own = np.concatenate([theta[first], np.zeros(room - first.size)])
     cosine = np.where(np.abs(np.cos(own)) < 1e-15, 0.0, np.cos(own))
-    rows = [jnp.asarray(np.pad(i, (0, size - n))) for i in np.split(index, 2)]
+    rows = [jax.device_put(np.pad(i, (0, size - n))) for i in np.split(index, 2)]
     return (_float64(np.sin(own) ** 2), _float64(cosine)), (rows[0], rows[1])
 
 
 def _float64(a: ArrayLike) -> jax.Array:
-    return jnp.asarray(a, dtype=jnp.float64)
+    return jax.device_put(np.asarray(a, dtype=np.float64))
 
 
 def for_channel(problem: Problem, c: int) -> Problem:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from fitting.geometry import Geometry
 from fitting.models.lobe import AxisPeak, Lobe, Peak, Shape
 from fitting.models.retro import Retro
 from fitting.models.turned_over import TurnedOver
+from fitting.peaks import peak as peak_of
 from fitting.reduced import Problem
 from fitting.solid_angle import angle_labels
 
@@ -77,7 +77,7 @@ def axis_slopes(g: Geometry, peak: AxisPeak) -> np.ndarray:
 
 def distances(g: Geometry, lobe: Lobe, shape: Shape) -> Distances | None:
     """How many widths every row is away from the top; None for a lobe without a peak."""
-    peak = lobe.peak(shape)
+    peak = peak_of(lobe, shape)
     if peak is None:
         return None
     if isinstance(peak, AxisPeak):
@@ -103,14 +103,14 @@ def width_parameters(
     """
     out: dict[str, tuple[bool, bool]] = {}
     taken = [False, False]
-    base = _sizes(lobe.peak({n: jnp.asarray(v) for n, v in shape.items()}))
+    base = _sizes(peak_of(lobe, shape))
     for p in lobe.parameters():
         if p.coefficient or p.name not in free or base is None:
             continue
         value = shape[p.name]
         moved = value + _PERTURBATION * max(abs(value), _PERTURBATION)
         other = {**shape, p.name: moved if moved <= p.support[1] else 2 * value - moved}
-        sizes = _sizes(lobe.peak({n: jnp.asarray(v) for n, v in other.items()}))
+        sizes = _sizes(peak_of(lobe, other))
         changes = [
             not t and a != b for t, a, b in zip(taken, sizes or base, base, strict=True)
         ]
@@ -152,7 +152,7 @@ def sentences(problem: Problem, values: dict[str, np.ndarray]) -> list[str]:
         mine = [n for n in own if f"{model.labels[i]}.{n}" in free]
         if not mine:
             continue
-        arrays = {n: jnp.asarray(v) for n, v in own.items()}
+        arrays = {n: jax.device_put(v) for n, v in own.items()}
         away = distances(geometry, lobe, arrays)
         if away is None:
             continue
@@ -230,8 +230,8 @@ def visible_width(
     for a lobe without a peak, where no row lies beyond, or if it is more than ``widest``.
     ``bright`` is the problem's `brightness`.
     """
-    own = {n: jnp.asarray(v) for n, v in shape.items()}
-    peak = lobe.peak(own)
+    own = {n: jax.device_put(v) for n, v in shape.items()}
+    peak = peak_of(lobe, own)
     if peak is None:
         return None
     geometry = jax.tree.map(np.asarray, problem.geometry)

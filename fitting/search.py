@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
@@ -69,7 +68,7 @@ def _search_one(
 
 
 def _refined(p: Problem, u: ArrayLike, x: ArrayLike) -> Solution:
-    return jax.device_get(refine(p, jnp.asarray(u), jnp.asarray(x)))
+    return jax.device_get(refine(p, *jax.device_put((u, x))))
 
 
 def _pulled_back(p: Problem, end: Solution) -> Solution:
@@ -102,7 +101,7 @@ def again(
     """Refit with other residuals, from every end: the order of the minima may change."""
     out: list[Found] = []
     for p, before in zip(problems(rows, model, options, **kwargs), found, strict=True):
-        begin = [(jnp.asarray(e.u), jnp.asarray(e.x)) for e in before.ends]
+        begin = [(e.u, e.x) for e in before.ends]
         out.append(_best(p, [jax.device_get(refine(p, u, x)) for u, x in begin]))
     return out
 

@@ -6,12 +6,12 @@ import dataclasses
 import functools
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from fitting import sampling
 from fitting.models.lobe import AxisPeak, Lobe
 from fitting.parameters import Parameter, to_real_line
+from fitting.peaks import peaks
 from fitting.reduced import Problem
 from fitting.solve import scan
 
@@ -91,7 +91,7 @@ def best_starts(problem: Problem, count: int) -> tuple[np.ndarray, np.ndarray]:
     narrow = narrow_candidates(problem, bright, points)
     if narrow.size:
         points = np.concatenate([points, narrow])
-    cost, x = scan(thinned(problem, bright), jnp.asarray(points))
+    cost, x = scan(thinned(problem, bright), jax.device_put(points))
     cost = np.where(np.isfinite(cost), np.asarray(cost), np.inf)
     chosen: list[int] = []
     for i in np.argsort(cost, kind="stable"):
@@ -173,12 +173,11 @@ def _sizes(
     nodes = ends[0] + (ends[1] - ends[0]) * share
     if scale == "log":
         nodes = ends[0] * (ends[1] / ends[0]) ** share
-    fixed = {n: jnp.asarray(v) for n, v in shape}
-    peak = jax.vmap(lambda v: lobe.peak({**fixed, name: v}))(jnp.asarray(nodes))
+    peak = peaks(lobe, dict(shape), name, nodes)
     if peak is None:
         return None
     if isinstance(peak, AxisPeak):
-        return nodes, np.sqrt(2.0 / np.maximum(np.asarray(peak.exponent), 1e-3))
+        return nodes, np.sqrt(2.0 / np.maximum(peak.exponent, 1e-3))
     x, y = np.asarray(peak.alpha_x), np.asarray(peak.alpha_y)
     return nodes, x if np.ptp(x) > 0 else y
 

@@ -21,7 +21,6 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy.linalg
 from jaxtyping import Array, Float
 
 from fitting import reduced, row_sums
@@ -53,7 +52,7 @@ def covariance(problem: Problem, end: Solution) -> Covariance:
 
     Penalties move the minimum but are no data: the information is that of the data alone.
     """
-    u, x = jnp.asarray(end.u), jnp.asarray(end.x)
+    u, x = jax.device_put((end.u, end.x))
     blocks = _data_blocks(problem, u, x) if problem.penalised else end.blocks
     b = jax.device_get(blocks)
     c, m, k = b.h_xu.shape
@@ -68,8 +67,7 @@ def covariance(problem: Problem, end: Solution) -> Covariance:
         bread[own, own] += inverse[i]
     noise = _fitted_noise(problem, u, x)
     matrix, first, second = (
-        np.asarray(v)
-        for v in _moments(problem, u, x, jnp.asarray(bread), jnp.asarray(noise))
+        np.asarray(v) for v in _moments(problem, u, x, *jax.device_put((bread, noise)))
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         freedom = np.where(second > 0, np.maximum(first * (first / second), 1.0), np.inf)
@@ -96,7 +94,12 @@ def _fitted_noise(problem: Problem, u: Array, x: Array) -> np.ndarray:
     """
     noise = np.ones(2)
     for _ in range(_NOISE_STEPS):
-        a, b, c, *right = np.asarray(_noise_sums(problem, u, x, jnp.asarray(noise)))
+        a, b, c, *right = sums = np.asarray(
+            _noise_sums(problem, u, x, jax.device_put(noise))
+        )
+        if not np.all(np.isfinite(sums)):
+            # An exact fit leaves nothing but rounding, whose squares' squares underflow.
+            break
         noise = _not_negative(np.array([[a, b], [b, c]]), np.array(right))
     return noise
 
@@ -186,9 +189,19 @@ def _on_free_directions(
     active = slack <= _ON_BOUND * np.maximum(np.abs(limits), 1e-3)
     inverse = np.zeros_like(hessian)
     for i, (own, h) in enumerate(zip(active, hessian, strict=True)):
-        free = scipy.linalg.null_space(rows[own]) if own.any() else np.eye(h.shape[0])
+        free = _null_space(rows[own]) if own.any() else np.eye(h.shape[0])
         inverse[i] = free @ _inverse(free.T @ h @ free) @ free.T
     return active, inverse
+
+
+def _null_space(rows: np.ndarray) -> np.ndarray:
+    """Orthonormal columns that are perpendicular to rows ``(r, m)``.
+
+    scipy.linalg has it too, and takes a tenth of a second to load.
+    """
+    _, size, v = np.linalg.svd(rows)
+    rank = np.sum(size > np.finfo(float).eps * max(rows.shape) * size[0])
+    return v[rank:].T
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:

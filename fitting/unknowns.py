@@ -7,6 +7,7 @@ import itertools
 import math
 import re
 
+import jax
 import numpy as np
 
 from fitting.albedo import LEAVING, lit_sides
@@ -79,6 +80,7 @@ def make_unknowns(model: Model, n_channels: int, options: FitOptions) -> Unknown
     rows, limits = _constraints(
         model, linear_free, linear_names, linear_source, constant, bounds, options
     )
+    put = jax.device_put
     return Unknowns(
         shape_names=tuple(shape_names),
         shape_source=tuple(source(n, shape_free) for n in shape_names),
@@ -86,12 +88,12 @@ def make_unknowns(model: Model, n_channels: int, options: FitOptions) -> Unknown
         coefficient_names=tuple(linear_names),
         coefficient_source=linear_source,
         n_coefficients=len(linear_free),
-        shape_constant=_columns([fixed.get(n, 0.0) for n in shape_names]),
-        lower=np.array([low for low, _ in supports], dtype=np.float64),
-        upper=np.array([high for _, high in supports], dtype=np.float64),
-        coefficient_constant=constant,
-        rows=rows,
-        limits=limits,
+        shape_constant=put(_columns([fixed.get(n, 0.0) for n in shape_names])),
+        lower=put(np.array([low for low, _ in supports], dtype=np.float64)),
+        upper=put(np.array([high for _, high in supports], dtype=np.float64)),
+        coefficient_constant=put(constant),
+        rows=put(rows),
+        limits=put(limits),
     )
 
 

@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from fitting import judge
@@ -63,7 +62,6 @@ def held_out_predictions(
         kwargs: dict[str, Any] = {"robust_width": width, "row_weights": keep}
         kwargs["penalised"] = found[0].problem.penalised
         for p, f in zip(problems(rows, model, options, **kwargs), found, strict=True):
-            u, x = jnp.asarray(f.solution.u), jnp.asarray(f.solution.x)
-            ends.append(Found(p, jax.device_get(refine(p, u, x)), ()))
+            ends.append(Found(p, jax.device_get(refine(p, f.solution.u, f.solution.x)), ()))
         out[held] = predicted_by(ends, rows)[held]
     return out

@@ -34,7 +34,7 @@ class WorstAlbedo(NamedTuple):
 
 def worst_albedo(model: Model, found: list[Found]) -> WorstAlbedo:
     """Over polar angles up to 89.5 deg from both sides; call with x64 enabled."""
-    cosines = np.cos(np.radians(_THETA_DEG))
+    cosines = jax.device_put(np.cos(np.radians(_THETA_DEG)))
     azimuths = np.radians([0.0, 45.0, 90.0, 135.0] if model.anisotropic else [0.0])
     worst = WorstAlbedo(-math.inf, 0.0, 0, "front", 0.0)
     for side in lit_sides(model):

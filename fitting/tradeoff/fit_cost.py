@@ -84,7 +84,6 @@ def solver_memory(measurement: Measurement, model: str, options: FitOptions) -> 
         _, problem, _ = problem_of(measurement, model, options)
         k, m = problem.unknowns.n_shape, problem.unknowns.n_coefficients
         x = jnp.zeros((problem.target.shape[0], m))
-        lower = refine.lower  # pyright: ignore[reportFunctionMemberAccess]
-        lowered = lower(problem, jnp.zeros(k), x)
+        lowered = refine.lower(problem, jnp.zeros(k), x)
         analysis = lowered.compile().compiled.memory_analysis()
     return None if analysis is None else int(analysis.temp_size_in_bytes)
