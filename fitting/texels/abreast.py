@@ -20,8 +20,8 @@ from fitting.texels.task import Task
 
 # Texels in lockstep, and in one call. Loops in vector registers may leave their last
 # elements to scalar code, which rounds differently: there are spare ones, never looked at.
-_ABREAST, _SPARE = 128, 16
-BATCH = 8 * (_ABREAST - _SPARE)
+_ABREAST, _OWN, _BLOCKS = 128, 112, 8
+BATCH = _BLOCKS * _OWN
 _STARTS = 2
 _LARGEST = 1e100
 # Where there are wide registers, there are more of them: enough for all the sums of a loop.
@@ -70,16 +70,21 @@ class Data(NamedTuple):
 
 
 class Texels(NamedTuple):
-    """A batch as descents take it: weights ``heavy (t, w, n)``, with a leading 1 for those
-    of all texels, ``values (t, c, n)`` of the rows that count, padded, and how many values
-    are known ``used (t, c)``."""
+    """A batch as descents take it, of the rows that count, padded.
+
+    ``heavy`` are weights ``(w, n)`` for all texels or, as are ``values``, so many at a time
+    with the spare ones: ``(blocks, abreast, w, n)`` and ``(blocks, abreast, c, n)``. ``used
+    (t, c)`` tells how many values are known. Texels after the first ``count`` are not
+    looked at.
+    """
 
     heavy: Array
     values: Array
     used: Array
+    size: Array
 
 
-def arranged(task: Task, data: Data, *, own_weights: bool) -> Texels:
+def arranged(task: Task, data: Data, count: Array, *, own_weights: bool) -> Texels:
     """With weights of their own where not every value of a texel is known."""
     padding = ((0, 0), (0, 0), (0, task.heavy.shape[-1] - task.rows.size))
 
@@ -99,20 +104,19 @@ def arranged(task: Task, data: Data, *, own_weights: bool) -> Texels:
     known = known & (task.heavy > 0)
     used = jnp.sum(known, axis=-1, dtype=jnp.int32)
     if not own_weights:
-        return Texels(heavy[None], values, used)
-    return Texels(jnp.where(known, heavy, 0.0), jnp.where(known, values, 0.0), used)
+        return Texels(heavy, _split(values), used, count)
+    heavy, values = jnp.where(known, heavy, 0.0), jnp.where(known, values, 0.0)
+    return Texels(_split(heavy), _split(values), used, count)
 
 
 def scanned(task: Task, texels: Texels) -> tuple[Starts, State]:
     """Where they begin, and the states there."""
 
-    def some(part: tuple[Array, ...]) -> tuple[Starts, State]:
-        heavy, values = (texels.heavy, *part) if len(part) == 1 else part
+    def some(heavy: Array, values: Array) -> tuple[Starts, State]:
         starts = scan(task, heavy, values, _STARTS)
         return starts, begun(task, starts.u[:, 0], starts.x[:, 0])
 
-    shared = texels.heavy.shape[0] == 1
-    return _abreast(some, (texels.values,) if shared else (texels.heavy, texels.values))
+    return _abreast(some, texels)
 
 
 def begun(task: Task, u: Array, x: Array) -> State:
@@ -132,21 +136,41 @@ def finished(task: Task, texels: Texels, state: State) -> Outcome:
 
 def _each(function: Any, texels: Texels, *others: Any) -> Any:
     """``function(heavy, values, *others)`` of every texel."""
-    if texels.heavy.shape[0] == 1:
-        one = functools.partial(function, texels.heavy[0])
-        return _abreast(lambda part: jax.vmap(one)(*part), (texels.values, *others))
-    both = (texels.heavy, texels.values, *others)
-    return _abreast(lambda part: jax.vmap(function)(*part), both)
+
+    def some(heavy: Array, *others: Any) -> Any:
+        if heavy.shape[0] == 1:
+            one = functools.partial(function, heavy[0])
+            return jax.vmap(one)(*others)
+        return jax.vmap(function)(heavy, *others)
+
+    return _abreast(some, texels, *others)
 
 
-def _abreast(function: Any, arrays: Any) -> Any:
-    """``function`` of a batch, for so many at a time."""
-    own = _ABREAST - _SPARE
+def _abreast(function: Any, texels: Texels, *others: Any) -> Any:
+    """``function(heavy, values, *others)`` of the first texels, for so many at a time.
 
-    def split(v: Array) -> Array:
-        parts = jnp.asarray(v).reshape(BATCH // own, own, *jnp.shape(v)[1:])
-        spare = [(0, 0), (0, _SPARE)] + [(0, 0)] * (parts.ndim - 2)
-        return jnp.pad(parts, spare, mode="edge")
+    ``heavy`` has a leading 1 where it is that of all.
+    """
+    arrays = (texels.values, *jax.tree.map(_split, others))
+    shared = texels.heavy.ndim == 2
+    if not shared:
+        arrays = (texels.heavy, *arrays)
 
-    out = jax.lax.map(function, jax.tree.map(split, arrays))
-    return jax.tree.map(lambda v: v[:, :own].reshape(BATCH, *v.shape[2:]), out)
+    def part(i: Any) -> Any:
+        here = jax.tree.map(lambda v: v[i], arrays)
+        return function(texels.heavy[None], *here) if shared else function(*here)
+
+    def add(i: Array, out: Any) -> Any:
+        return jax.tree.map(lambda v, new: v.at[i].set(new), out, part(i))
+
+    like = jax.eval_shape(lambda: part(0))
+    empty = jax.tree.map(lambda v: jnp.zeros((_BLOCKS, *v.shape), v.dtype), like)
+    out = jax.lax.fori_loop(0, (texels.size + _OWN - 1) // _OWN, add, empty)
+    return jax.tree.map(lambda v: v[:, :_OWN].reshape(BATCH, *v.shape[2:]), out)
+
+
+def _split(v: Any) -> Array:
+    """``(t, ...)`` as ``(blocks, abreast, ...)``."""
+    parts = jnp.asarray(v).reshape(_BLOCKS, _OWN, *jnp.shape(v)[1:])
+    spare = [(0, 0), (0, _ABREAST - _OWN)] + [(0, 0)] * (parts.ndim - 2)
+    return jnp.pad(parts, spare, mode="edge")

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -97,13 +98,15 @@ def best_of_choices(
         held = {i: ends[i][k - 1][1] for i, k in enumerate(choice) if k}
         free = [i for i in range(m) if i not in held]
         pull = [linear[i] - sum(hessian[i][j] * held[j] for j in held) for i in free]
-        matrix = [[hessian[i][j] for j in free] for i in free]
-        (inner,) = small.solve(matrix, [pull])
+        # Divided once where it is the same for many: compilers do it again for each.
+        lower, pivots = small.factored([[hessian[i][j] for j in free] for i in free])
+        lower, inverse = jax.lax.optimization_barrier((lower, [1.0 / d for d in pivots]))
+        inner = small.solved(lower, inverse, pull)
         found = held | dict(zip(free, inner, strict=True))
         x = [found[i] for i in range(m)]
-        gain = sum(
-            x[i] * (linear[i] - 0.5 * sum(hessian[i][j] * x[j] for j in range(m)))
-            for i in range(m)
+        gain = 0.5 * small.dot(pull, inner) + sum(
+            held[i] * (linear[i] - 0.5 * sum(hessian[i][j] * held[j] for j in held))
+            for i in held
         )
         for i in free:
             for sign, value in ends[i]:

@@ -72,8 +72,8 @@ def _fit(
     task = run.task
     few = np.asarray(_FIRST_STEPS if task.even else _FEW_STEPS)
 
-    def first(some: Data) -> tuple[Outcome, State, Starts, Array]:
-        texels = run(arranged, some, own_weights=own_weights)
+    def first(count: Any, some: Data) -> tuple[Outcome, State, Starts, Array]:
+        texels = run(arranged, some, count, own_weights=own_weights)
         starts, state = run(scanned, texels)
         if single:
             state = _roughly(run, texels, state, few)
@@ -81,6 +81,7 @@ def _fit(
         return run(finished, texels, state), state, starts, texels.used
 
     outcome, state, starts, used = _in_batches(first, data)
+    state.done[:] &= outcome.as_promised
     complete = np.all(used == np.asarray(task.used), axis=-1)
     ratio = np.full(complete.size, np.nan)
     # A second start is refined only where it may lead to something better.
@@ -135,8 +136,8 @@ class _Rest(NamedTuple):
     def finished(self, state: State) -> Outcome:
         """What is known of them at the end."""
 
-        def finish(data: Data, some: State) -> Outcome:
-            texels = self.run(arranged, data, own_weights=self.own_weights)
+        def finish(count: Any, data: Data, some: State) -> Outcome:
+            texels = self.run(arranged, data, count, own_weights=self.own_weights)
             return self.run(finished, texels, some)
 
         return _in_batches(finish, self.data, state)
@@ -147,8 +148,8 @@ class _Rest(NamedTuple):
             if not waiting.size:
                 break
 
-            def go_on(data: Data, some: State, until: int = until) -> State:
-                texels = self.run(arranged, data, own_weights=self.own_weights)
+            def go_on(count: Any, data: Data, some: State, until: int = until) -> State:
+                texels = self.run(arranged, data, count, own_weights=self.own_weights)
                 return self.run(gone_on, texels, some, np.asarray(until))
 
             some = _taken(self.data, waiting), _taken(state, waiting)
@@ -183,7 +184,7 @@ def _single(v: Any) -> Any:
 
 def _begun(run: Compiled, u: Any, x: Any) -> State:
     """The states before descents from ``u (t, k)`` and ``x (t, c, m)``."""
-    return _in_batches(lambda *some: run(begun, *some), u, x)
+    return _in_batches(lambda _, *some: run(begun, *some), u, x)
 
 
 def _taken(arrays: Any, index: np.ndarray) -> Any:
@@ -197,13 +198,14 @@ def _replace(whole: Any, index: np.ndarray, new: Any, where: Any = ...) -> None:
 
 
 def _in_batches(function: Any, *arrays: Any) -> Any:
-    """``function(*arrays)`` of batches of one size, as numpy; the last one is filled up."""
+    """``function(count, *arrays)`` of batches of one size, as numpy; the last one, of which
+    fewer count, is filled up."""
     count = jax.tree.leaves(arrays)[0].shape[0]
     parts = []
     for first in range(0, count, BATCH):
         last = min(first + BATCH, count)
         batch = jax.tree.map(lambda v, a=first, b=last: _filled(v[a:b]), arrays)
-        out = function(*batch)
+        out = function(np.asarray(last - first), *batch)
         parts.append(jax.tree.map(lambda v, n=last - first: np.asarray(v)[:n], out))
     return jax.tree.map(lambda *v: np.concatenate(v), *parts)
 

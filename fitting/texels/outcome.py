@@ -12,12 +12,17 @@ from fitting.texels.descent import State
 from fitting.texels.spread import Spread, spread
 from fitting.texels.task import Task
 
+# Of a promise, and of the cost, whose sums are rounded and where nothing is to be gained.
+_SURPRISING, _ROUNDING = 0.1, 1e-9
+
 
 class Outcome(NamedTuple):
     """One texel's: all shape parameters and coefficients, in the unknowns' order.
 
     Uncertainties (k = 1) are NaN for what is fixed or held by a bound; all is NaN where
-    too few values are known. ``used`` counts values of all channels.
+    too few values are known. ``used`` counts values of all channels. ``as_promised`` tells
+    whether the last step gained what the quadratic said: what is left to be gained is that
+    times the square of the difference, as a share.
     """
 
     shape: Float[Array, " s"]
@@ -28,6 +33,7 @@ class Outcome(NamedTuple):
     converged: Bool[Array, ""]
     steps: Int[Array, ""]
     used: Int[Array, ""]
+    as_promised: Bool[Array, ""]
 
 
 def outcome(
@@ -47,6 +53,8 @@ def outcome(
     u = jnp.where(better, state.next_u, state.u)
     x = jnp.where(better, state.next_x, b.x)
     cost = jnp.where(better, known.cost, b.cost)
+    surprise = jnp.abs(b.cost - known.cost - state.predicted)
+    as_promised = surprise <= _SURPRISING * state.predicted + _ROUNDING * b.cost
     enough = jnp.all(used >= m) & (number >= m * used.size + k) & jnp.isfinite(cost)
 
     def kept(rows: list[Array], *size: int) -> Array:
@@ -67,6 +75,7 @@ def outcome(
         converged=state.done & enough,
         steps=state.steps,
         used=number,
+        as_promised=as_promised,
     )
 
 

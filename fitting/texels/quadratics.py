@@ -86,9 +86,11 @@ def at_candidates(task: Task, heavy: Array, values: Array) -> Quadratics:
 
     def with_values(wide: Array) -> Array:
         """``(c, p, t)``: weighted values times functions ``(d, p, n)`` of candidates."""
-        if wide.shape[0] == 1:
-            return jnp.einsum("tcn,pn->cpt", weighed, wide[0])
-        return jnp.einsum("tcn,cpn->cpt", weighed, wide)
+        by_channel = [
+            jnp.einsum("tn,pn->pt", weighed[:, c], wide[min(c, wide.shape[0] - 1)])
+            for c in range(values.shape[1])
+        ]
+        return jnp.stack(by_channel)
 
     def among(one: Array, other: Array) -> Array:
         """The weighted sum of a product of functions, ``(1 or c, p, 1 or t)``."""

@@ -47,9 +47,7 @@ def scan(
     for i in range(count):
         best = jax.lax.argmin(left, 0, jnp.int32)
         costs.append(jnp.min(left, axis=0))
-        far = (
-            jnp.max(jnp.abs(points[:, None] - points[best]), axis=-1, initial=0.0) > _APART
-        )
+        far = jnp.max(jnp.abs(points[:, None] - points[best]), axis=-1, initial=0) > _APART
         left = jnp.where(far, left, jnp.inf)
         if task.even and i == 0:
             place, at = between.minimum(task, quadratics, cost, best)

@@ -24,10 +24,16 @@ Matrix = Sequence[Vector]
 
 def solve(matrix: Matrix, rights: Sequence[Vector]) -> list[list[Array]]:
     """Solutions of a symmetric positive definite system, by ``L D L'``."""
-    m = len(matrix)
+    lower, pivots = factored(matrix)
+    inverse = [1.0 / d for d in pivots]
+    return [solved(lower, inverse, right) for right in rights]
+
+
+def factored(matrix: Matrix) -> tuple[list[list[Array]], list[Array]]:
+    """``L``, without its diagonal, and ``D``."""
     pivots: list[Array] = []
     lower: list[list[Array]] = []
-    for i in range(m):
+    for i in range(len(matrix)):
         row: list[Array] = []
         for j in range(i):
             known = [row[p] * pivots[p] * lower[j][p] for p in range(j)]
@@ -37,16 +43,19 @@ def solve(matrix: Matrix, rights: Sequence[Vector]) -> list[list[Array]]:
         least = _RIDGE * rounding.eps * jnp.abs(matrix[i][i]) + rounding.tiny
         pivots.append(jnp.maximum(left, least))
         lower.append(row)
-    solutions: list[list[Array]] = []
-    for right in rights:
-        z: list[Array] = []
-        for i in range(m):
-            z.append(right[i] - sum(lower[i][j] * z[j] for j in range(i)))
-        x = [z[i] / pivots[i] for i in range(m)]
-        for i in reversed(range(m)):
-            x[i] = x[i] - sum(lower[j][i] * x[j] for j in range(i + 1, m))
-        solutions.append(x)
-    return solutions
+    return lower, pivots
+
+
+def solved(lower: Matrix, inverse: Vector, right: Vector) -> list[Array]:
+    """The solution for one right side, of a matrix with ``L`` and ``1 / D``."""
+    m = len(right)
+    z: list[Array] = []
+    for i in range(m):
+        z.append(right[i] - sum(lower[i][j] * z[j] for j in range(i)))
+    x = [z[i] * inverse[i] for i in range(m)]
+    for i in reversed(range(m)):
+        x[i] = x[i] - sum(lower[j][i] * x[j] for j in range(i + 1, m))
+    return x
 
 
 def product(a: Matrix, b: Matrix) -> list[list[Array]]:
