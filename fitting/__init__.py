@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from fitting.options import FitOptions
     from fitting.result import FitResult, ResultError, json_schema, load_result
     from fitting.scoring import Score, score
+    from fitting.texels import TexelFits, fit_many
 
 _HOME = {
     "Measurement": "data_formats",
@@ -43,6 +44,8 @@ _HOME = {
     "load_result": "fitting.result",
     "Score": "fitting.scoring",
     "score": "fitting.scoring",
+    "TexelFits": "fitting.texels",
+    "fit_many": "fitting.texels",
 }
 
 __all__ = [
@@ -56,8 +59,10 @@ __all__ = [
     "ModelError",
     "ResultError",
     "Score",
+    "TexelFits",
     "compare",
     "fit",
+    "fit_many",
     "from_angles",
     "json_schema",
     "load_result",

@@ -20,7 +20,7 @@ from fitting.texels.task import Task
 
 # Texels in lockstep, and in one call. Loops in vector registers may leave their last
 # elements to scalar code, which rounds differently: there are spare ones, never looked at.
-_ABREAST, _OWN, _BLOCKS = 128, 112, 8
+_ABREAST, _OWN, _BLOCKS = 128, 112, 16
 BATCH = _BLOCKS * _OWN
 _STARTS = 2
 _LARGEST = 1e100

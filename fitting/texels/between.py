@@ -19,29 +19,33 @@ from fitting.texels import small
 from fitting.texels.quadratics import Quadratics, at, minimised
 from fitting.texels.task import Task
 
-# Of a polynomial, the candidate in the middle where there are enough to each side.
+# Of a polynomial, the nearest candidate in the middle if there are enough to each side.
 _NODES = 9
 _HALF = _NODES // 2
+# Of the candidates, that many times fewer are enough to find the best.
+EVERY = 2
+_THREE = np.arange(-1, 2, dtype=np.int32)
 _FURTHEST = 0.6
 # Coefficients of powers, by node, of the polynomial that is 1 there and 0 at the others.
 _POWERS = np.linalg.inv(np.vander(np.arange(-_HALF, _HALF + 1.0), increasing=True)).T
 
 
 def minimum(
-    task: Task, q: Quadratics, cost: Float[Array, "p t"], best: Int[Array, " t"]
+    task: Task, q: Quadratics, cost: Float[Array, "s t"], best: Int[Array, " t"]
 ) -> tuple[Float[Array, "t 1"], list[Array]]:
     """The shape with the least cost near the best candidate, and coefficients ``(c, t)``.
 
-    A parabola through three costs, and from its minimum a step of Newton's method.
+    ``cost`` is that of every `EVERY`-th candidate, of which the ``best`` is one. A parabola
+    through three costs, and from its minimum a step of Newton's method.
     """
-    last = task.points.shape[0] - 1
-    first = jnp.clip(best - _HALF, 0, last + 1 - _NODES)
-    centre = first + _HALF
-    three = jnp.clip(best, 1, last - 1) + jnp.arange(-1, 2, dtype=best.dtype)[:, None]
+    three = jnp.clip(best, 1, cost.shape[0] - 2) + _THREE[:, None]
     below, here, above = at(cost[None], three)[0]
-    place = (best - centre).astype(cost.dtype)
-    place = place + _step(0.5 * (above - below), below - 2.0 * here + above)
-    slope, bend, x = _profile(task, q, first, place)
+    step = _step(0.5 * (above - below), below - 2.0 * here + above)
+    place = EVERY * (best.astype(cost.dtype) + step)
+    nearest = jnp.round(place).astype(best.dtype)
+    centre = jnp.clip(nearest, _HALF, task.points.shape[0] - 1 - _HALF)
+    place = place - centre.astype(place.dtype)
+    slope, bend, x = _profile(task, q, centre, place)
     place = jnp.clip(place + _step(slope, bend), -_HALF, _HALF)
     apart = task.points[1] - task.points[0]
     return task.points[centre] + place[:, None] * apart, x
@@ -55,11 +59,11 @@ def _step(slope: Array, bend: Array) -> Array:
 
 
 def _profile(
-    task: Task, q: Quadratics, first: Array, place: Array
+    task: Task, q: Quadratics, centre: Array, place: Array
 ) -> tuple[Array, Array, list[Array]]:
     """Derivatives ``(t,)`` of the least cost along the shape, and its coefficients."""
     m = len(q.linear)
-    h, b, k = _interpolated(q, first, place)
+    h, b, k = _interpolated(q, centre, place)
     value = [[e[0] for e in row] for row in h]
     x, _ = minimised(task, Quadratics(value, [e[0] for e in b], k[0]))
     low, high = task.box.low, task.box.high
@@ -80,10 +84,10 @@ def _profile(
     return jnp.sum(slope, axis=0), jnp.sum(bend, axis=0), x
 
 
-def _interpolated(q: Quadratics, first: Array, place: Array) -> Any:
+def _interpolated(q: Quadratics, centre: Array, place: Array) -> Any:
     """Value and two derivatives in the place of every element, at places ``(t,)`` from the
     middle of the nodes; what does not depend on the shape has no derivatives."""
-    nodes = first + jnp.arange(_NODES, dtype=first.dtype)[:, None]
+    nodes = centre + np.arange(-_HALF, _HALF + 1, dtype=centre.dtype)[:, None]
     leaves, tree = jax.tree.flatten(q)
     moving = [v for v in leaves if v.shape[1] > 1]
     # All in one array, written once: a few loops instead of hundreds.

@@ -20,9 +20,9 @@ from fitting.texels.arrow import evaluate
 from fitting.texels.box import held_at
 from fitting.texels.task import Task
 
-# The promised decrease, as a share of the cost, at which one step more is the last and its
-# end is not looked at again: that is within 1e-3 of a standard uncertainty of the minimum,
-# and costs less than 1e-9 more. The second one is a share of the weighted data.
+# The promised decrease, as a share of the cost, at which one step more is the last: it ends
+# within 1e-3 of a standard uncertainty of the minimum, and costs less than 1e-8 more, which
+# `fitting.texels.outcome` checks. The second one is a share of the weighted data.
 _LAST_STEP = 1e-5
 _NO_STEP = 1e-20
 _MAX_SHAPE_STEP = 1.5

@@ -21,7 +21,7 @@ from fitting.texels.task import Task, make_task
 
 # Of measured values in one chunk, and the most texels: what is in memory at a time.
 _CHUNK_BYTES = 48_000_000
-_CHUNK_TEXELS = 8192
+_CHUNK_TEXELS = 14336
 OBJECTIVE = "l2cos"
 
 

@@ -21,8 +21,8 @@ class Outcome(NamedTuple):
 
     Uncertainties (k = 1) are NaN for what is fixed or held by a bound; all is NaN where
     too few values are known. ``used`` counts values of all channels. ``as_promised`` tells
-    whether the last step gained what the quadratic said: what is left to be gained is that
-    times the square of the difference, as a share.
+    whether the last step gained what the quadratic said. Where it gained less by a share
+    ``s``, about ``s^2`` of the promise is left to be gained.
     """
 
     shape: Float[Array, " s"]

@@ -38,9 +38,10 @@ def scan(
     exact = values.dtype
     # Half the precision and time: what is found here is only where to begin.
     task, heavy, values = jax.tree.map(_single, (task, heavy, values))
-    points, shape = task.points, (values.shape[1], values.shape[0])
     quadratics = at_candidates(task, heavy, values)
-    _, cost = minimised(task, quadratics)
+    every = between.EVERY if task.even else 1
+    points, shape = task.points[::every], (values.shape[1], values.shape[0])
+    _, cost = minimised(task, jax.tree.map(lambda v: v[:, ::every], quadratics))
     cost = jnp.broadcast_to(cost, (points.shape[0], shape[1]))
     left = jnp.where(jnp.isfinite(cost), jnp.maximum(cost, 0.0), jnp.inf)
     u, x, costs = [], [], []
@@ -52,7 +53,8 @@ def scan(
         if task.even and i == 0:
             place, at = between.minimum(task, quadratics, cost, best)
         else:
-            place, at = points[best], minimised(task, quadratics.at(best))[0]
+            place = points[best]
+            at, _ = minimised(task, quadratics.at(best * every))
         u.append(place)
         x.append([jnp.broadcast_to(v, shape) for v in at])
     found = jnp.asarray(x).reshape(count, -1, *shape)

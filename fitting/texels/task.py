@@ -24,7 +24,7 @@ from fitting.texels.box import Box, make_box
 # So that reductions over rows have no remainder.
 _ROWS_AT_ONCE = 8
 # Candidates of one shape unknown, close enough for polynomials between them.
-_EVEN = 48
+_EVEN = 49
 _OFF = {"robust": False, "per_channel_shape": False, "energy": 0, "reciprocity": 0}
 _LINEAR = tuple(name for name, o in OBJECTIVES.items() if o.linear)
 
