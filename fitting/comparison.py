@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from fitting.models.lobe import THROUGH
 from fitting.options import FitOptions
 from fitting.result import Candidate, Candidates, FitResult
 from fitting.rows import ways_of
+from fitting.side_by_side import side_by_side
 
 # What is tried when the user names no model: diffuse plus one lobe with long skirts, with
 # short ones, or without the 1/(cos cos) of a facet on air (flakes below a clear coat); and
@@ -149,7 +151,8 @@ def compare(
             measurement, model, options, progress=lambda s: say(f"{model}: {s}"), **settings
         )
 
-    results = tuple(one(model) for model in models)
+    jobs = [functools.partial(one, model) for model in models]
+    results = tuple(side_by_side(jobs, measurement.value.size))
     best, reason = choose(results)
     return Comparison(results, best, reason)
 

@@ -15,6 +15,7 @@ import importlib
 import json
 import os
 import platform
+import threading
 import zlib
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
@@ -30,7 +31,6 @@ _PACKAGE = Path(__file__).parent
 _COMPILES_NOTHING = _PACKAGE / "cli"
 _SUFFIX = ".program"
 _PLAIN = (type(None), bool, int, float, str)
-_NEVER = 1e9
 _folder: Path | None = None
 
 
@@ -88,7 +88,7 @@ def made(
     lowered = jax.jit(listed, compiler_options=options).lower(*arrays)
     if "custom_call" in lowered.as_text():
         return None
-    with _without_writing_to_jax_cache():
+    with _not_in_jax_cache:
         compiled = lowered.compile()
     program = Program(compiled, trees[-1])
     with contextlib.suppress(NotImplementedError, TypeError, ValueError):
@@ -123,16 +123,33 @@ def _path(described: str) -> Path:
     return _folder / (hashlib.sha256(described.encode()).hexdigest()[:40] + _SUFFIX)
 
 
-@contextlib.contextmanager
-def _without_writing_to_jax_cache() -> Iterator[None]:
-    """What JAX has read from its own cache cannot be written again: these are not there."""
-    name = "jax_persistent_cache_min_compile_time_secs"
-    before = getattr(jax.config, name)
-    jax.config.update(name, _NEVER)
-    try:
-        yield
-    finally:
-        jax.config.update(name, before)
+class _NotInJaxCache:
+    """What JAX has read from its own cache cannot be written again: these are not there.
+
+    The setting is one for all threads: the first in makes it, the last out undoes it.
+    """
+
+    _NAME = "jax_persistent_cache_min_compile_time_secs"
+    _NEVER = 1e9
+
+    def __init__(self) -> None:
+        self._lock, self._inside, self._before = threading.Lock(), 0, 0.0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._inside:
+                self._before = getattr(jax.config, self._NAME)
+                jax.config.update(self._NAME, self._NEVER)
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if not self._inside:
+                jax.config.update(self._NAME, self._before)
+
+
+_not_in_jax_cache = _NotInJaxCache()
 
 
 def _device() -> list[str]:

@@ -19,6 +19,12 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+def allowed() -> int:
+    """How many threads this process may keep busy: all cores, unless it was limited."""
+    told = os.environ.get(_BY_CORE[0], "")
+    return min(cores(), int(told)) if told.isdigit() and int(told) else cores()
+
+
 def limit_threads(threads: int) -> None:
     """So many threads for a process that shares a machine with others like it.
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+from typing import Any
+
 from data_formats import Measurement
 from fitting.by_name import own_settings, unused, unused_words
 from fitting.cli import terminal
@@ -13,6 +16,8 @@ from fitting.comparison import Comparison, choose, default_models
 from fitting.fitter import fit
 from fitting.model import Model
 from fitting.options import FitOptions
+from fitting.result import FitResult
+from fitting.side_by_side import side_by_side
 
 
 def run(measurement: Measurement, job: Job, flags: Flags) -> Comparison:
@@ -27,20 +32,22 @@ def run(measurement: Measurement, job: Job, flags: Flags) -> Comparison:
     options = [own_settings(m, job.options) for m in models]
     console = terminal.stderr()
     quiet = flags.quiet or job.json
-    results = []
     with Steps(console, len(models), quiet=quiet, verbose=flags.verbose) as steps:
-        for model, own in zip(models, options, strict=True):
-            steps.begin(model.expression)
-            results.append(
-                fit(
+
+        def one(model: Model, own: dict[str, Any]) -> FitResult:
+            with steps.of(model.expression) as say:
+                return fit(
                     measurement,
                     model,
                     FitOptions(**own),
                     cross_validate=job.cross_validate,
                     colour=job.colour,
-                    progress=steps.say,
+                    progress=say,
                 )
-            )
+
+        both = zip(models, options, strict=True)
+        jobs = [functools.partial(one, model, own) for model, own in both]
+        results = side_by_side(jobs, measurement.value.size)
     best, reason = choose(tuple(results))
     if len(results) > 1 and not job.cross_validate:
         reason = (

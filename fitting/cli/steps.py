@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 
 from rich.console import Console
@@ -10,9 +12,10 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 
 
 class Steps:
-    """Says which model is being fitted and what is done with it.
+    """Says which models are being fitted and what is done with them.
 
-    A context manager; `begin` a model, then call `say` with what is being done.
+    A context manager; so is `of` a model, which gives a function to call with what is done.
+    Models may be fitted side by side.
     """
 
     def __init__(self, console: Console, total: int, *, quiet: bool, verbose: bool):
@@ -20,9 +23,7 @@ class Steps:
         self._total = total
         self._quiet = quiet
         self._verbose = verbose
-        self._done = 0
-        self._model = ""
-        self._first = True
+        self._begun = 0
         self._start = time.monotonic()
         live = console.is_terminal and not quiet
         self._progress = _bar(console) if live else None
@@ -44,25 +45,30 @@ class Steps:
         if self._progress is not None:
             self._progress.stop()
 
-    def begin(self, model: str) -> None:
-        """A model's turn."""
-        self._model, self._first = model, True
-        if self._progress is not None and self._task is not None:
-            self._progress.update(self._task, completed=self._done)
-        elif not self._quiet:
-            self._console.print(f"fitting {model} ({self._done + 1} of {self._total})")
-        self._done += 1
+    @contextmanager
+    def of(self, model: str) -> Iterator[Callable[[str], None]]:
+        """A model's turn: call what this gives with what is done with the model now."""
+        self._begun += 1
+        if self._progress is None and not self._quiet:
+            self._console.print(f"fitting {model} ({self._begun} of {self._total})")
+        first = True
 
-    def say(self, what: str) -> None:
-        """What is done with the model now."""
-        if self._first:
-            what += " (compiling, once per model)"
-            self._first = False
+        def say(what: str) -> None:
+            nonlocal first
+            what += " (compiling, once per model)" if first else ""
+            first = False
+            self._say(model, what)
+
+        yield say
+        if self._progress is not None and self._task is not None:
+            self._progress.advance(self._task)
+
+    def _say(self, model: str, what: str) -> None:
         if self._verbose and not self._quiet:
             elapsed = time.monotonic() - self._start
-            self._console.print(f"{elapsed:7.1f} s  {self._model}: {what}", style="dim")
+            self._console.print(f"{elapsed:7.1f} s  {model}: {what}", style="dim")
         if self._progress is not None and self._task is not None:
-            self._progress.update(self._task, description=f"{self._model}: {what}")
+            self._progress.update(self._task, description=f"{model}: {what}")
 
 
 def _bar(console: Console) -> Progress:
