@@ -20,10 +20,14 @@ from fitting.texels.arrow import evaluate
 from fitting.texels.box import held_at
 from fitting.texels.task import Task
 
-# The promised decrease, as a share of the cost, at which one step more is the last: it ends
-# within 1e-3 of a standard uncertainty of the minimum, and costs less than 1e-8 more, which
-# `fitting.texels.outcome` checks. The second one is a share of the weighted data.
-_LAST_STEP = 1e-5
+# What a last step, whose end is not looked at again, may leave to be gained, as a share of
+# the cost: that is far within 1e-3 of a standard uncertainty of the minimum. A step that
+# gained less or more than was promised, by a share of that, leaves the promise times the
+# share's square. It is not counted on to be smaller than the second figure, which stands
+# for the first step too; of this one `fitting.texels.outcome` checks the gain.
+_LEFT = 1e-9
+_LEAST_SURPRISE = 0.01
+# Of the weighted data: nothing.
 _NO_STEP = 1e-20
 _MAX_SHAPE_STEP = 1.5
 _FIRST_DAMPING = 1e-3
@@ -95,8 +99,10 @@ def descend(
         u, blocks = choose((s.next_u, new), (s.u, s.blocks))
         noticed = first | (gained > _NOTICEABLE * new.cost)
         idle = jnp.where(accept, jnp.where(noticed, 0, s.idle + 1), s.idle)
-        next_u, next_x, predicted = propose(task, u, blocks, damping)
-        near = predicted <= _LAST_STEP * blocks.cost + _NO_STEP * scale
+        next_u, next_x, predicted, whole = propose(task, u, blocks, damping)
+        surprise = jnp.where(first, 0.0, jnp.maximum(jnp.abs(1.0 - gain), damping))
+        near = whole * surprise.clip(_LEAST_SURPRISE, 1.0) ** 2 <= _LEFT * blocks.cost
+        near = near | (whole <= _NO_STEP * scale)
         stuck = (damping > _STUCK) | (idle >= _MAX_IDLE)
         next_u = jnp.where(stuck, u, next_u)
         next_x = jnp.where(stuck, blocks.x, next_x)
@@ -108,8 +114,11 @@ def descend(
     return jax.lax.while_loop(lambda s: ~s.done & (s.steps < until), step, state)
 
 
-def propose(task: Task, u: Array, b: Blocks, damping: Array) -> tuple[Array, Array, Array]:
-    """The next shape and coefficients, and the decrease that the quadratic promises."""
+def propose(
+    task: Task, u: Array, b: Blocks, damping: Array
+) -> tuple[Array, Array, Array, Array]:
+    """The next shape and coefficients, and the decrease that the quadratic promises: there,
+    and where it is least."""
     x, k, m = b.x, u.shape[0], b.x.shape[1]
     free, h_xx, h_xu = on_free(task, b)
     pull = [jnp.where(free[:, i], b.g_x[:, i], 0.0) for i in range(m)]
@@ -121,6 +130,7 @@ def propose(task: Task, u: Array, b: Blocks, damping: Array) -> tuple[Array, Arr
     ]
     *responses, along = small.solve(stiff, [*h_xu, pull])
     promise = jnp.sum(jnp.asarray(small.dot(pull, along)))
+    whole = promise * stiffer
     x_step = [-v for v in along]
     if k:
         schur = [
@@ -131,7 +141,8 @@ def propose(task: Task, u: Array, b: Blocks, damping: Array) -> tuple[Array, Arr
         gradient = [
             b.g_u[p] - jnp.sum(jnp.asarray(small.dot(h_xu[p], along))) for p in range(k)
         ]
-        step = _shape_step(schur, gradient, jnp.diagonal(b.h_uu), damping)
+        step, gain = _shape_step(schur, gradient, jnp.diagonal(b.h_uu), damping)
+        whole = whole + gain
         bent = [
             2.0 * g + small.dot(row, step) for g, row in zip(gradient, schur, strict=True)
         ]
@@ -141,20 +152,24 @@ def propose(task: Task, u: Array, b: Blocks, damping: Array) -> tuple[Array, Arr
         u = u + jnp.stack(step)
     if m:
         x = jnp.clip(x + jnp.stack(x_step, axis=-1), task.box.low, task.box.high)
-    return u, x, jnp.maximum(promise, 0.0)
+    return u, x, jnp.maximum(promise, 0.0), whole
 
 
 def _shape_step(
     schur: small.Matrix, gradient: small.Vector, diagonal: Array, damping: Array
-) -> list[Array]:
-    """The damped step, no longer than `_MAX_SHAPE_STEP` in any unknown."""
-    damped = [list(row) for row in schur]
-    for p, row in enumerate(damped):
-        row[p] = row[p] + damping * jnp.maximum(row[p], 1e-12 * diagonal[p]) + 1e-300
-    (step,) = small.solve(damped, [[-g for g in gradient]])
+) -> tuple[list[Array], Array]:
+    """The damped step, no longer than `_MAX_SHAPE_STEP` in any unknown; and what that
+    without damping would gain."""
+    plain, damped = [list(row) for row in schur], [list(row) for row in schur]
+    for p, row in enumerate(schur):
+        least = jnp.maximum(row[p], 1e-12 * diagonal[p])
+        plain[p][p] = least + 1e-300
+        damped[p][p] = row[p] + damping * least + 1e-300
+    down = [-g for g in gradient]
+    (step,), (free,) = small.solve(damped, [down]), small.solve(plain, [down])
     longest = functools.reduce(jnp.maximum, [abs(v) for v in step])
     share = jnp.minimum(1.0, _MAX_SHAPE_STEP / jnp.maximum(longest, 1e-300))
-    return [v * share for v in step]
+    return [v * share for v in step], jnp.asarray(small.dot(down, free))
 
 
 def on_free(
