@@ -15,6 +15,6 @@ def test_texels_are_hundreds_of_times_faster_than_one_by_one(line):
     assert ratios["wrong"] == 0
     for name in ("finite differences", "exact Jacobian"):
         assert ratios[f"{name}, excess"] <= 1e-6
-    # By CPU time, which other programs disturb least: 340 to 600, and 130 to 220.
-    assert ratios["finite differences"] >= 250
-    assert ratios["exact Jacobian"] >= 90
+    # By CPU time, which other programs disturb least: 630 to 870, and 270 to 350.
+    assert ratios["finite differences"] >= 450
+    assert ratios["exact Jacobian"] >= 180

@@ -4,7 +4,10 @@
     python tests/benchmarks/texels_speed.py 8192       so many
 
 Both run on the same cores in the same minutes; CPU seconds stand beside those of the clock,
-because other programs disturb them less.
+because other programs disturb them less. Measured on two virtual cores of an AMD EPYC,
+against finite differences and an exact Jacobian: 14 us of CPU a texel, 870 and 320 times
+less than scipy, and 1,100 and 440 times by the clock; on one core alone (`taskset -c 0`)
+11 us of either, 630 and 270 times less.
 """
 
 from __future__ import annotations
