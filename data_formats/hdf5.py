@@ -20,15 +20,18 @@ The attribute `measurement_json` of the file holds symmetry, channels, notes and
 from __future__ import annotations
 
 import os
+from typing import TYPE_CHECKING
 from urllib.parse import quote, unquote
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from data_formats import metadata
 from data_formats.measurement import Measurement, MeasurementError, Provenance
 from data_formats.source import MAX_BYTES, Source, load
+
+if TYPE_CHECKING:
+    import h5py
 
 NAME = "hdf5"
 SUFFIXES = (".h5", ".hdf5", ".nc")
@@ -79,6 +82,9 @@ def damaged(source: Source, error: BaseException) -> MeasurementError:
 
 def open_image(source: Source) -> h5py.File:
     """The file, from its bytes in memory."""
+    # Only where it is needed: every read of any format looks at this module.
+    import h5py
+
     return h5py.File(h5py.h5f.open_file_image(source.data))
 
 
@@ -87,6 +93,8 @@ def numbers(file: h5py.File, name: str, source: Source) -> NDArray[np.float64]:
 
     **Raises:** `MeasurementError` if it is absent, elsewhere, not numeric or too large.
     """
+    import h5py
+
     link = file.get(name, getlink=True)
     item = file.get(name) if isinstance(link, h5py.HardLink) else None
     if not isinstance(item, h5py.Dataset) or item.is_virtual or item.external:
@@ -140,6 +148,8 @@ def _read(file: h5py.File, source: Source) -> Measurement:
 
 def write(measurement: Measurement, path: str | os.PathLike[str]) -> None:
     """Write the container; `read` gives back the same measurement, bit for bit."""
+    import h5py
+
     m = measurement
     if os.fspath(path).lower().endswith(".gz"):
         raise MeasurementError("HDF5 files are compressed inside; drop .gz from the name")

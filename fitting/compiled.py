@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import weakref
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
 
@@ -19,10 +20,15 @@ import jax.numpy as jnp
 from jax.core import Tracer
 
 from fitting import kept_programs
+from fitting.batch.threads import allowed
 from fitting.kept_programs import Program
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
+# Where arrays are short, the compiler takes longer than what it compiles: without its
+# slower ways it takes two thirds of the time, for code that takes a tenth longer.
+_FEW = 8192
+_QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
 # Linux grants a process 65,530 regions of memory; every compiled function takes three for
 # good, small ones included, and where they are used up the compiler aborts.
 _MANY = 30_000
@@ -46,26 +52,48 @@ class Compiled(Generic[_P, _T]):
     def __init__(self, function: Callable[_P, _T], options: dict[str, Any] | None):
         functools.update_wrapper(self, function)
         self._function: Callable[..., _T] = function
-        self._options = options
-        self._jitted = eqx.filter_jit(function, compiler_options=options)  # pyright: ignore
-        self._ready: dict[Any, Callable[..., Any]] = {}
+        self._options = options or {}
+        self._jitted: dict[bool, Callable[..., Any]] = {}
+        self._ready: dict[Any, Callable[..., Any] | Future] = {}
         _all.add(self)
 
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
         leaves, tree = jax.tree.flatten((args, kwargs))
         arrays = [v for v in leaves if eqx.is_array(v)]
-        if kept_programs.folder() is None or any(isinstance(v, Tracer) for v in arrays):
-            return self._jitted(*args, **kwargs)
-        # Precision as it is now, which decides about numbers that have none of their own.
-        key = (tree, str(jnp.result_type(float)), *map(_kind, leaves))
+        if any(isinstance(v, Tracer) for v in arrays):
+            return self._function(*args, **kwargs)
+        if kept_programs.folder() is None:
+            return self._plain(leaves)(*args, **kwargs)
+        key = _key(tree, leaves)
         run = self._ready.get(key)
+        if isinstance(run, Future):
+            run = self._ready[key] = run.result()
         if run is None:
             run = self._ready[key] = self._made_ready(key, leaves)
-        return run(*arrays) if run is not self._jitted else run(*args, **kwargs)
+        if run in self._jitted.values():
+            return run(*args, **kwargs)
+        return run(*arrays)
+
+    def begin(self, *args: Any, **kwargs: Any) -> None:
+        """Read or compile in the background what a call with such arguments will need.
+
+        Arrays may be `jax.ShapeDtypeStruct`. Nothing where programs are not kept.
+        """
+        leaves, tree = jax.tree.flatten((args, kwargs))
+        key = _key(tree, leaves)
+        if kept_programs.folder() is None or key in self._ready:
+            return
+        x64 = jnp.result_type(float) == jnp.float64
+
+        def made_ready() -> Callable[..., Any]:
+            with jax.enable_x64(x64):
+                return self._made_ready(key, leaves)
+
+        self._ready[key] = _background().submit(made_ready)
 
     def lower(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
         """The program as `jax.jit` lowers it, to look into."""
-        return self._jitted.lower(*args, **kwargs)
+        return self._plain(jax.tree.leaves((args, kwargs))).lower(*args, **kwargs)  # type: ignore
 
     def forget(self) -> None:
         """What was read or compiled; what is needed is read again."""
@@ -75,19 +103,28 @@ class Compiled(Generic[_P, _T]):
         """A function of the arrays alone, or of everything where it cannot be kept."""
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         tree, *kinds = key
-        described = kept_programs.description(name, self._options, tree, kinds)
-        if described is None:
-            return self._jitted
-        program = kept_programs.read(described)
-        if program is None:
-            arrays = [v for v in leaves if eqx.is_array(v)]
+        options = self._options | (_QUICK if _are_few(leaves) else {})
+        described = kept_programs.description(name, options, tree, kinds)
+        program = None if described is None else kept_programs.read(described)
+        if described is not None and program is None:
+            arrays = [v for v in leaves if _is_array(v)]
             function = self._flat(tree, leaves)
-            program = kept_programs.made(described, function, arrays, self._options)
-        return self._jitted if program is None else _joined(program)
+            program = kept_programs.made(described, function, arrays, _known(options))
+        return self._plain(leaves) if program is None else _joined(program)
+
+    def _plain(self, leaves: list[Any]) -> Callable[..., Any]:
+        """The function as JAX compiles it for this process."""
+        few = _are_few(leaves)
+        if few not in self._jitted:
+            options = _known(self._options | (_QUICK if few else {}))
+            self._jitted[few] = eqx.filter_jit(  # pyright: ignore[reportCallIssue]
+                self._function, compiler_options=options
+            )
+        return self._jitted[few]
 
     def _flat(self, tree: Any, leaves: list[Any]) -> Callable[..., _T]:
         """The function of its arrays, in order."""
-        is_array = [eqx.is_array(v) for v in leaves]
+        is_array = [_is_array(v) for v in leaves]
         fixed = [None if array else v for array, v in zip(is_array, leaves, strict=True)]
 
         def flat(*arrays: Any) -> _T:
@@ -105,9 +142,42 @@ def _joined(program: Program) -> Callable[..., Any]:
     return lambda *arrays: jax.tree.unflatten(program.out_tree, program.run(*arrays))
 
 
+@functools.cache
+def _background() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(allowed(), "compiling")
+
+
+def _are_few(leaves: list[Any]) -> bool:
+    lengths = (n for v in leaves if _is_array(v) for n in v.shape)
+    return max(lengths, default=0) <= _FEW and jax.default_backend() == "cpu"
+
+
+def _known(options: dict[str, Any]) -> dict[str, Any]:
+    """Those that this version of the compiler knows."""
+    return {name: v for name, v in options.items() if _is_known(name, v)}
+
+
+@functools.cache
+def _is_known(name: str, value: Any) -> bool:
+    try:
+        jax.jit(lambda: 0, compiler_options={name: value}).lower().compile()
+    except jax.errors.JaxRuntimeError:
+        return False
+    return True
+
+
+def _is_array(leaf: Any) -> bool:
+    return eqx.is_array(leaf) or isinstance(leaf, jax.ShapeDtypeStruct)
+
+
+def _key(tree: Any, leaves: list[Any]) -> tuple:
+    """With the precision as it is now, which numbers have that have none of their own."""
+    return (tree, str(jnp.result_type(float)), *map(_kind, leaves))
+
+
 def _kind(leaf: Any) -> Any:
     """What the program depends on: of an array its shape and type, else the value."""
-    if not eqx.is_array(leaf):
+    if not _is_array(leaf):
         return type(leaf).__name__, leaf
     return jnp.shape(leaf), str(leaf.dtype), bool(getattr(leaf, "weak_type", False))
 

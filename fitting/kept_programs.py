@@ -12,6 +12,7 @@ import contextlib
 import functools
 import hashlib
 import importlib
+import itertools
 import json
 import os
 import platform
@@ -176,8 +177,10 @@ def _surroundings() -> tuple[str, ...]:
 
 def _processor() -> str:
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        return "".join(sorted({s for s in lines if s.startswith(("flags", "Features"))}))
+        with open("/proc/cpuinfo") as file:
+            # The first core's; the others are like it.
+            first = itertools.takewhile(str.strip, file)
+            return "".join(s for s in first if s.startswith(("flags", "Features")))
     except OSError:
         # Then the same machine it is to be.
         return " ".join(platform.uname())

@@ -11,7 +11,7 @@ import jax
 import numpy as np
 from jax.typing import ArrayLike
 
-from fitting import judge, starts
+from fitting import ahead, judge, starts
 from fitting.model import Model
 from fitting.options import FitOptions
 from fitting.predict import predict_geometry
@@ -61,6 +61,7 @@ def search(rows: Rows, model: Model, options: FitOptions) -> list[Found]:
 def _search_one(
     p: Problem, options: FitOptions, also: tuple[ArrayLike, ArrayLike] | None = None
 ) -> Found:
+    ahead.begin(p)
     count = max(1, options.starts) if p.unknowns.n_shape else 1
     points, x = starts.best_starts(p, count)
     begin = [*zip(points, x, strict=True), *([also] if also else [])]

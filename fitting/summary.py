@@ -33,27 +33,35 @@ class Found:
         return tuple(c if np.isfinite(c) else np.inf for c in cost)
 
     def values(self) -> dict[str, np.ndarray]:
-        """All parameters by name; coefficients ``(c,)``. In numpy: nothing to compile."""
-        unknowns = jax.device_get(self.problem.unknowns)
-        shape = unknowns.shape(np.asarray(self.solution.u))
-        constant = np.asarray(unknowns.coefficient_constant)
-        linear = [
-            unknowns.coefficients(x, c)
-            for x, c in zip(np.asarray(self.solution.x), constant.T, strict=True)
-        ]
-        own = {n: np.asarray(v) for n, v in shape.items()}
-        for name, constant, (index, _) in zip(
-            unknowns.shape_names,
-            np.asarray(unknowns.shape_constant),
-            unknowns.shape_source,
-            strict=True,
-        ):
-            if index < 0 and np.ptp(constant) > 0:
-                own[name] = constant
-        return own | {
-            n: np.asarray([float(one[n]) for one in linear])
-            for n in unknowns.coefficient_names
-        }
+        """All parameters by name; coefficients ``(c,)``."""
+        return values_at(
+            self.problem, np.asarray(self.solution.u), np.asarray(self.solution.x)
+        )
+
+
+def values_at(problem: Problem, u: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
+    """All parameters by name, of unknowns ``(k,)`` and ``(c, m)``.
+
+    In numpy: nothing to compile.
+    """
+    unknowns = jax.device_get(problem.unknowns)
+    shape = unknowns.shape(u)
+    linear = [
+        unknowns.coefficients(own, c)
+        for own, c in zip(x, np.asarray(unknowns.coefficient_constant).T, strict=True)
+    ]
+    out = {n: np.asarray(v) for n, v in shape.items()}
+    for name, constant, (index, _) in zip(
+        unknowns.shape_names,
+        np.asarray(unknowns.shape_constant),
+        unknowns.shape_source,
+        strict=True,
+    ):
+        if index < 0 and np.ptp(constant) > 0:
+            out[name] = constant
+    return out | {
+        n: np.asarray([float(one[n]) for one in linear]) for n in unknowns.coefficient_names
+    }
 
 
 def joined_values(found: list[Found]) -> dict[str, np.ndarray]:

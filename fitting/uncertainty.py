@@ -16,6 +16,7 @@ Methodology 28, 169). ``v`` comes from relative and absolute noise fitted to the
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import NamedTuple
 
 import jax
@@ -74,6 +75,14 @@ def covariance(problem: Problem, end: Solution) -> Covariance:
     whole = float(end.cost)
     penalty = max(1.0 - float(b.cost) / whole, 0.0) if whole > 0 else 0.0
     return Covariance(matrix, freedom, active, penalty)
+
+
+def begin(problem: Problem, u: jax.ShapeDtypeStruct, x: jax.ShapeDtypeStruct) -> None:
+    """Compile in the background what `covariance` needs at such unknowns."""
+    noise = jax.ShapeDtypeStruct((2,), u.dtype)
+    size = math.prod(x.shape) + math.prod(u.shape)
+    _noise_sums.begin(problem, u, x, noise)
+    _moments.begin(problem, u, x, jax.ShapeDtypeStruct((size, size), u.dtype), noise)
 
 
 @compiled(row_sums.FAST)

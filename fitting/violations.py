@@ -16,7 +16,8 @@ from fitting.model import Model
 from fitting.models.lobe import THROUGH
 from fitting.predict import predict_geometry
 from fitting.problem import reciprocity_pairs
-from fitting.summary import Found
+from fitting.reduced import Problem
+from fitting.summary import Found, values_at
 
 _DENSE_NODES = 32
 _THETA_DEG = np.concatenate([np.arange(0.0, 80.0, 4.0), np.arange(80.0, 90.0, 0.5)])
@@ -34,7 +35,7 @@ class WorstAlbedo(NamedTuple):
 
 def worst_albedo(model: Model, found: list[Found]) -> WorstAlbedo:
     """Over polar angles up to 89.5 deg from both sides; call with x64 enabled."""
-    cosines = jax.device_put(np.cos(np.radians(_THETA_DEG)))
+    cosines = _cosines()
     azimuths = np.radians([0.0, 45.0, 90.0, 135.0] if model.anisotropic else [0.0])
     worst = WorstAlbedo(-math.inf, 0.0, 0, "front", 0.0)
     for side in lit_sides(model):
@@ -51,6 +52,19 @@ def worst_albedo(model: Model, found: list[Found]) -> WorstAlbedo:
                 worst = max(worst, here, key=lambda w: w.albedo)
             channel += f.solution.x.shape[0]
     return worst
+
+
+def begin(problem: Problem) -> None:
+    """Compile in the background what `worst_albedo` needs."""
+    u = np.zeros(problem.unknowns.n_shape)
+    x = np.zeros((problem.target.shape[0], problem.unknowns.n_coefficients))
+    values = values_at(problem, u, x)
+    for side in lit_sides(problem.model):
+        _dense_albedo.begin(problem.model, values, _cosines(), np.float64(0.0), side)
+
+
+def _cosines() -> jax.Array:
+    return jax.device_put(np.cos(np.radians(_THETA_DEG)))
 
 
 @compiled()

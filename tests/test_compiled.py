@@ -191,3 +191,45 @@ def test_making_room(monkeypatch):
     assert not function._ready
     np.testing.assert_array_equal(function(np.ones(2), np.ones(2), "+"), [2, 2])
     assert counted.traced == 1
+
+
+def test_what_was_begun_is_not_traced_again():
+    counted = Counted()
+    function = Compiled(counted, None)
+    stand_in = jax.ShapeDtypeStruct((2,), np.float32)
+    for _ in range(2):
+        function.begin(stand_in, stand_in, "+")
+    ones = np.ones(2, np.float32)
+    np.testing.assert_array_equal(function(ones, ones, "+"), [2, 2])
+    assert counted.traced == 1
+
+
+def test_what_goes_wrong_in_the_background_is_said_where_it_is_needed():
+    def wrong(a):
+        raise RuntimeError("no such thing")
+
+    function = Compiled(Counted(wrong), None)
+    function.begin(np.ones(2))
+    with pytest.raises(RuntimeError, match="no such thing"):
+        function(np.ones(2))
+
+
+def test_a_fit_uses_all_that_was_begun_for_it():
+    from concurrent.futures import Future
+
+    import synthetic
+
+    from fitting import fit, solve, uncertainty, violations
+
+    truth = {"lambert.albedo": [0.3, 0.2], "ggx.alpha": 0.2}
+    truth |= {"ggx.f0": [0.05, 0.06], "ggx.f90": [1.0, 1.0]}
+    data = synthetic.measurement("lambert + ggx", truth, relative=0.02)
+    fit(data, "lambert + ggx", cross_validate=False)
+    begun = (
+        solve.refine, uncertainty._noise_sums, uncertainty._moments,
+        violations._dense_albedo,
+    )  # fmt: skip
+    for function in begun:
+        assert function._ready
+        assert not any(isinstance(v, Future) for v in function._ready.values())
+        function.forget()

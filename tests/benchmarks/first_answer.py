@@ -3,8 +3,8 @@
     python tests/benchmarks/first_answer.py
     python tests/benchmarks/first_answer.py FILE
 
-CPU and wall seconds of whole processes: the very first fit on a machine, with an empty cache
-for compiled code, and later ones. Without a file: the bundled sample.
+CPU and wall seconds of whole processes: the very first fit on a machine, with an empty
+cache for compiled code, and later ones. Without a file: the bundled sample.
 """
 
 from __future__ import annotations

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
-import time
 from importlib.metadata import version
 from pathlib import Path
 
@@ -43,21 +40,3 @@ def test_unwritable(tmp_path):
     (tmp_path / "file").write_text("")
     assert jax_setup.is_writable(tmp_path / "new" / "folder")
     assert not jax_setup.is_writable(tmp_path / "file" / "folder")
-
-
-@pytest.mark.slow
-def test_a_second_process_does_not_compile(tmp_path):
-    environment = os.environ | {"BRDF_CACHE_DIR": str(tmp_path / "cache")}
-    program = "import sys; from fitting.cli import main; sys.exit(main(sys.argv[1:]))"
-
-    def seconds() -> float:
-        start = time.perf_counter()
-        subprocess.run(
-            [sys.executable, "-c", program, "fit", "-m", "lambert + ggx", "-q"],
-            check=True, env=environment, cwd=tmp_path, capture_output=True,
-        )  # fmt: skip
-        return time.perf_counter() - start
-
-    first, second = seconds(), seconds()
-    assert list((tmp_path / "cache").iterdir())
-    assert second < 0.6 * first
