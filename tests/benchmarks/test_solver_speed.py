@@ -41,5 +41,5 @@ def test_a_pass_takes_a_few_times_as_long_as_one_by_hand(line: Line, rows, chann
     with jax.enable_x64(True):
         mine, theirs = passes(problem_of(made(rows, channels)), 9)
     line(f"a pass over {rows} x {channels}: {mine / theirs:.1f} times the C kernel's")
-    # 1.6, and 3 to 4.
-    assert mine <= (3.0 if channels == 3 else 6.0) * theirs
+    # 1.4 to 1.7.
+    assert mine <= 3.0 * theirs
