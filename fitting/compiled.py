@@ -27,7 +27,7 @@ _P = ParamSpec("_P")
 _T = TypeVar("_T")
 # Where arrays are short, the compiler takes longer than what it compiles: without its
 # slower ways it takes two thirds of the time, for code that takes a tenth longer.
-_FEW = 8192
+_FEW = 2000
 _QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
 # Linux grants a process 65,530 regions of memory; every compiled function takes three for
 # good, small ones included, and where they are used up the compiler aborts.

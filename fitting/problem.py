@@ -17,7 +17,7 @@ from fitting.model import Model
 from fitting.models import Way
 from fitting.objectives import OBJECTIVES
 from fitting.options import FitOptions
-from fitting.padding import CHUNK, padded, room
+from fitting.padding import CHUNK, padded, room, rows_at_once
 from fitting.reduced import Problem
 from fitting.rows import Rows
 from fitting.unknowns import make_unknowns
@@ -136,7 +136,7 @@ def prepare(
         unknowns=make_unknowns(model, n_channels, options),
         objective=objective,
         robust=math.isfinite(robust_width),
-        chunk=min(size, CHUNK),
+        chunk=rows_at_once(size),
         penalised=penalised,
         geometry=jax.tree.map(jax.device_put, rows.padded),
         angles=angles,

@@ -18,14 +18,36 @@ from fitting.texels.outcome import Outcome, outcome
 from fitting.texels.scan import Starts, scan
 from fitting.texels.task import Task
 
-# Texels in lockstep, and in one call. Loops in vector registers may leave their last
-# elements to scalar code, which rounds differently: there are spare ones, never looked at.
-_ABREAST, _OWN, _BLOCKS = 128, 112, 16
-BATCH = _BLOCKS * _OWN
 _STARTS = 2
 _LARGEST = 1e100
 # Where there are wide registers, there are more of them: enough for all the sums of a loop.
 _OPTIONS = {**row_sums.FAST, "xla_cpu_prefer_vector_width": 512}
+
+
+class Lanes(NamedTuple):
+    """How many texels go in lockstep, and how many such blocks make a batch.
+
+    Loops in vector registers may leave their last elements to scalar code, which rounds
+    differently: there are ``spare`` ones, never looked at.
+    """
+
+    own: int
+    blocks: int
+    spare: int = 16
+
+    @property
+    def batch(self) -> int:
+        """Texels in one call."""
+        return self.own * self.blocks
+
+
+@functools.cache
+def lanes() -> Lanes:
+    """Those of this process's device."""
+    if jax.default_backend() == "cpu":
+        return Lanes(112, 16)
+    # A GPU is idle between small blocks: with this one it takes half the time.
+    return Lanes(16_368, 1)
 
 
 class Compiled:
@@ -163,14 +185,16 @@ def _abreast(function: Any, texels: Texels, *others: Any) -> Any:
     def add(i: Array, out: Any) -> Any:
         return jax.tree.map(lambda v, new: v.at[i].set(new), out, part(i))
 
+    own, blocks, _ = lanes()
     like = jax.eval_shape(lambda: part(0))
-    empty = jax.tree.map(lambda v: jnp.zeros((_BLOCKS, *v.shape), v.dtype), like)
-    out = jax.lax.fori_loop(0, (texels.size + _OWN - 1) // _OWN, add, empty)
-    return jax.tree.map(lambda v: v[:, :_OWN].reshape(BATCH, *v.shape[2:]), out)
+    empty = jax.tree.map(lambda v: jnp.zeros((blocks, *v.shape), v.dtype), like)
+    out = jax.lax.fori_loop(0, (texels.size + own - 1) // own, add, empty)
+    return jax.tree.map(lambda v: v[:, :own].reshape(own * blocks, *v.shape[2:]), out)
 
 
 def _split(v: Any) -> Array:
     """``(t, ...)`` as ``(blocks, abreast, ...)``."""
-    parts = jnp.asarray(v).reshape(_BLOCKS, _OWN, *jnp.shape(v)[1:])
-    spare = [(0, 0), (0, _ABREAST - _OWN)] + [(0, 0)] * (parts.ndim - 2)
+    own, blocks, more = lanes()
+    parts = jnp.asarray(v).reshape(blocks, own, *jnp.shape(v)[1:])
+    spare = [(0, 0), (0, more)] + [(0, 0)] * (parts.ndim - 2)
     return jnp.pad(parts, spare, mode="edge")

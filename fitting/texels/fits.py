@@ -15,7 +15,7 @@ from data_formats import MeasurementError
 from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions
-from fitting.texels.abreast import BATCH
+from fitting.texels.abreast import lanes
 from fitting.texels.many import fit_chunk
 from fitting.texels.task import Task, make_task
 
@@ -110,7 +110,8 @@ def lines_per_chunk(shape: tuple[int, ...]) -> int:
     """How many indices of the first axis of values of this shape a chunk has."""
     *others, n, channels = shape[1:]
     texels = min(_CHUNK_TEXELS, _CHUNK_BYTES // (8 * n * channels))
-    texels = max(BATCH, texels // BATCH * BATCH)
+    batch = lanes().batch
+    texels = max(batch, texels // batch * batch)
     return max(1, min(shape[0], texels // max(1, math.prod(others))))
 
 

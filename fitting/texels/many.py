@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Array
 
 from fitting.texels.abreast import (
-    BATCH,
     Compiled,
     Data,
     Texels,
@@ -23,6 +22,7 @@ from fitting.texels.abreast import (
     begun,
     finished,
     gone_on,
+    lanes,
     scanned,
 )
 from fitting.texels.descent import State
@@ -202,8 +202,9 @@ def _in_batches(function: Any, *arrays: Any) -> Any:
     fewer count, is filled up."""
     count = jax.tree.leaves(arrays)[0].shape[0]
     parts = []
-    for first in range(0, count, BATCH):
-        last = min(first + BATCH, count)
+    batch_size = lanes().batch
+    for first in range(0, count, batch_size):
+        last = min(first + batch_size, count)
         batch = jax.tree.map(lambda v, a=first, b=last: _filled(v[a:b]), arrays)
         out = function(np.asarray(last - first), *batch)
         parts.append(jax.tree.map(lambda v, n=last - first: np.asarray(v)[:n], out))
@@ -211,5 +212,5 @@ def _in_batches(function: Any, *arrays: Any) -> Any:
 
 
 def _filled(v: np.ndarray) -> np.ndarray:
-    missing = BATCH - v.shape[0]
+    missing = lanes().batch - v.shape[0]
     return v if not missing else np.concatenate([v, np.repeat(v[-1:], missing, axis=0)])

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 from data_formats import Channel, Measurement, MeasurementError
 from fitting import Model, ModelError, fit, from_angles
 from fitting.texels import TexelFits, fit_many
-from fitting.texels.abreast import BATCH
+from fitting.texels.abreast import lanes
 
 ANGLES = texel_samples.directions()
 MODEL = "lambert + ggx"
@@ -198,7 +198,7 @@ def compiled(request: pytest.FixtureRequest):
 
 def test_neighbours_do_not_matter(compiled):
     """Bit for bit: in another order, without half of them, alone, with broken ones."""
-    texels = 2 * BATCH + 100
+    texels = 2 * lanes().batch + 100
     clean = texel_samples.values_of(MODEL, texel_samples.truth(texels), ANGLES)
     values = texel_samples.noisy(clean, 0.03)
     values[5::13, 8, 1] = np.nan
