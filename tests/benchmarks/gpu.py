@@ -10,7 +10,7 @@ it. The solver is timed from rows that are prepared to a minimum; preparing them
 work, the same for both. Texels also in float32 with a last descent in float64, which is for
 GPUs that are slow at float64.
 
-On an H200 (and 16 cores of the processor beside it) see the README.
+The README has what an H200 gained against 16 cores.
 """
 
 from __future__ import annotations
@@ -122,14 +122,13 @@ def in_own_process(platform: str, share: int) -> tuple[str, dict[str, list[float
     return tuple(json.loads(out))  # type: ignore
 
 
-def gpu_platform() -> str | None:
-    """What JAX calls the platform of the GPU at hand, of any make."""
-    program = "import jax; print(jax.devices('gpu')[0].platform)"
+def has_gpu() -> bool:
+    """Whether JAX finds one, of any make."""
     done = subprocess.run(
-        [sys.executable, "-c", program],
-        env=os.environ | {"JAX_PLATFORMS": ""}, capture_output=True, text=True,
+        [sys.executable, "-c", "import jax; jax.devices('gpu')"],
+        env=os.environ | {"JAX_PLATFORMS": ""}, capture_output=True,
     )  # fmt: skip
-    return "cuda,cpu" if done.returncode == 0 else None
+    return done.returncode == 0
 
 
 def main() -> int:
@@ -145,12 +144,11 @@ def main() -> int:
         print(json.dumps([jax.devices()[0].device_kind, measured(given.here)]))
         return 0
     share = 10 if given.quick else 1
-    platform = gpu_platform()
-    if platform is None:
+    if not has_gpu():
         print(NO_GPU)
         return 0
     _, cpu = in_own_process("cpu", share)
-    name, gpu = in_own_process(platform, share)
+    name, gpu = in_own_process("", share)
     print(f"{'seconds':44} {'CPU':>9} {name:>20} {'ratio':>7} {'results':>9}")
     for job, (seconds, result) in cpu.items():
         there, other = gpu[job]
