@@ -70,8 +70,6 @@ class Compiled(Generic[_P, _T]):
             run = self._ready[key] = run.result()
         if run is None:
             run = self._ready[key] = self._made_ready(key, leaves)
-        if run in self._jitted.values():
-            return run(*args, **kwargs)
         return run(*arrays)
 
     def begin(self, *args: Any, **kwargs: Any) -> None:
@@ -100,17 +98,20 @@ class Compiled(Generic[_P, _T]):
         self._ready.clear()
 
     def _made_ready(self, key: tuple, leaves: list[Any]) -> Callable[..., Any]:
-        """A function of the arrays alone, or of everything where it cannot be kept."""
+        """The function of its arrays alone, kept if that is possible."""
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         tree, *kinds = key
         options = self._options | (_QUICK if _are_few(leaves) else {})
+        function, arrays = self._flat(tree, leaves), [v for v in leaves if _is_array(v)]
+        program = None
         described = kept_programs.description(name, options, tree, kinds)
-        program = None if described is None else kept_programs.read(described)
-        if described is not None and program is None:
-            arrays = [v for v in leaves if _is_array(v)]
-            function = self._flat(tree, leaves)
-            program = kept_programs.made(described, function, arrays, _known(options))
-        return self._plain(leaves) if program is None else _joined(program)
+        if described is not None:
+            program = kept_programs.read(described)
+            if program is None:
+                program = kept_programs.made(described, function, arrays, _known(options))
+        if program is None:
+            return jax.jit(function, compiler_options=_known(options))
+        return _joined(program)
 
     def _plain(self, leaves: list[Any]) -> Callable[..., Any]:
         """The function as JAX compiles it for this process."""
