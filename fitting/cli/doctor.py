@@ -93,9 +93,10 @@ def _cache() -> Finding:
             True, f"off, since {jax_setup.OVERRIDE} is empty: every run compiles"
         )
     if not jax_setup.is_writable(folder):
+        what = "what is not there yet" if folder.is_dir() else "everything"
         return Finding(
             False,
-            f"{folder} cannot be written to, so every run compiles",
+            f"{folder} cannot be written to, so every run compiles {what}",
             f"set {jax_setup.OVERRIDE} to a folder of yours",
         )
     size = sum(f.stat().st_size for f in folder.iterdir() if f.is_file())

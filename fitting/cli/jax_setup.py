@@ -15,6 +15,7 @@ from fitting.batch.threads import cores, same_sums
 
 OVERRIDE = "BRDF_CACHE_DIR"
 _JAX_OWN = "JAX_COMPILATION_CACHE_DIR"
+_NEVER = 1e9
 
 
 def cache_folder() -> Path | None:
@@ -53,12 +54,16 @@ def set_up() -> None:
 
     from fitting import kept_programs
 
-    folder = writable_cache()
-    kept_programs.keep_in(folder)
-    if folder is None:
+    folder = cache_folder()
+    writable = folder is not None and is_writable(folder)
+    # One that others have filled is used also where it may only be read.
+    usable = folder if folder is not None and (writable or folder.is_dir()) else None
+    kept_programs.keep_in(usable)
+    if usable is None:
         return
-    jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    jax.config.update("jax_compilation_cache_dir", str(usable))
+    least = 0.0 if writable else _NEVER
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", least)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
 
 

@@ -6,8 +6,10 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
+import jax
 import pytest
 
+from fitting import kept_programs
 from fitting.cli import jax_setup
 
 
@@ -40,3 +42,31 @@ def test_unwritable(tmp_path):
     (tmp_path / "file").write_text("")
     assert jax_setup.is_writable(tmp_path / "new" / "folder")
     assert not jax_setup.is_writable(tmp_path / "file" / "folder")
+
+
+@pytest.fixture
+def settings(monkeypatch):
+    """What is told to JAX and to whom keeps programs, without telling it."""
+    told: dict[str, object] = {}
+    monkeypatch.setattr(jax.config, "update", told.__setitem__)
+    monkeypatch.setattr(kept_programs, "keep_in", lambda f: told.__setitem__("kept", f))
+    return told
+
+
+@pytest.mark.parametrize("writable", [True, False])
+def test_a_cache_of_others_is_read(tmp_path, monkeypatch, settings, writable):
+    monkeypatch.setenv("BRDF_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(jax_setup, "is_writable", lambda _: writable)
+    jax_setup.set_up()
+    assert settings["kept"] == tmp_path
+    assert settings["jax_compilation_cache_dir"] == str(tmp_path)
+    least = settings["jax_persistent_cache_min_compile_time_secs"]
+    assert least == 0 if writable else least > 1e6  # type: ignore[operator]
+
+
+def test_no_cache(tmp_path, monkeypatch, settings):
+    for chosen in ("", str(tmp_path / "nowhere")):
+        monkeypatch.setenv("BRDF_CACHE_DIR", chosen)
+        monkeypatch.setattr(jax_setup, "is_writable", lambda _: False)
+        jax_setup.set_up()
+        assert settings == {"kept": None}
