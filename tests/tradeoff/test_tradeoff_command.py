@@ -74,7 +74,8 @@ def test_what_is_written_is_what_was_found(done):
     assert glossy.errors.typical < 0.2 * matt.errors.typical
     assert glossy.errors.albedo.rms < 0.2 * matt.errors.albedo.rms
     assert glossy.fit.starts > 1
-    assert glossy.fit.memory_bytes > 600 * 7 * 8
+    # Sums for every channel, and at most a few arrays of the size of the rows.
+    assert 7 * 8 < glossy.fit.memory_bytes < 10 * 600 * 7 * 8
     assert table.noise_floors[0].typical < glossy.errors.typical
     assert not table.interrupted
     assert table.trades == []
