@@ -10,15 +10,16 @@ from fitting.reduced import Problem
 from fitting.solve import refine
 
 
-def begin(problem: Problem) -> None:
+def begin(problem: Problem, *, last: bool) -> None:
     """Of a problem that is about to be searched: descents, albedos and uncertainties.
 
-    Costs nothing but the compiler's time where one of them is not needed after all.
+    The latter two if this search is the ``last``, unless penalties are needed after all.
     """
     unknowns = problem.unknowns
     shape = (problem.target.shape[0], unknowns.n_coefficients)
     u = jax.ShapeDtypeStruct((unknowns.n_shape,), jnp.float64)
     x = jax.ShapeDtypeStruct(shape, jnp.float64)
     refine.begin(problem, u, x)
-    uncertainty.begin(problem, u, x)
-    violations.begin(problem)
+    if last:
+        uncertainty.begin(problem, u, x)
+        violations.begin(problem)

@@ -53,17 +53,14 @@ class Compiled(Generic[_P, _T]):
         functools.update_wrapper(self, function)
         self._function: Callable[..., _T] = function
         self._options = options or {}
-        self._jitted: dict[bool, Callable[..., Any]] = {}
         self._ready: dict[Any, Callable[..., Any] | Future] = {}
         _all.add(self)
 
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
         leaves, tree = jax.tree.flatten((args, kwargs))
-        arrays = [v for v in leaves if eqx.is_array(v)]
+        arrays = [v for v in leaves if _is_array(v)]
         if any(isinstance(v, Tracer) for v in arrays):
             return self._function(*args, **kwargs)
-        if kept_programs.folder() is None:
-            return self._plain(leaves)(*args, **kwargs)
         key = _key(tree, leaves)
         run = self._ready.get(key)
         if isinstance(run, Future):
@@ -77,9 +74,11 @@ class Compiled(Generic[_P, _T]):
 
         Arrays may be `jax.ShapeDtypeStruct`. Nothing where programs are not kept.
         """
+        if kept_programs.folder() is None:
+            return
         leaves, tree = jax.tree.flatten((args, kwargs))
         key = _key(tree, leaves)
-        if kept_programs.folder() is None or key in self._ready:
+        if key in self._ready:
             return
         x64 = jnp.result_type(float) == jnp.float64
 
@@ -89,9 +88,11 @@ class Compiled(Generic[_P, _T]):
 
         self._ready[key] = _background().submit(made_ready)
 
-    def lower(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
+    def lower(self, *args: _P.args, **kwargs: _P.kwargs) -> jax.stages.Lowered:
         """The program as `jax.jit` lowers it, to look into."""
-        return self._plain(jax.tree.leaves((args, kwargs))).lower(*args, **kwargs)  # type: ignore
+        leaves, tree = jax.tree.flatten((args, kwargs))
+        arrays = [v for v in leaves if _is_array(v)]
+        return self._jitted(tree, leaves).lower(*arrays)
 
     def forget(self) -> None:
         """What was read or compiled; what is needed is read again."""
@@ -99,32 +100,21 @@ class Compiled(Generic[_P, _T]):
 
     def _made_ready(self, key: tuple, leaves: list[Any]) -> Callable[..., Any]:
         """The function of its arrays alone, kept if that is possible."""
+        tree, keeps, *kinds = key
+        if not keeps:
+            return self._jitted(tree, leaves)
         name = f"{self._function.__module__}.{self._function.__qualname__}"
-        tree, *kinds = key
-        options = self._options | (_QUICK if _are_few(leaves) else {})
-        function, arrays = self._flat(tree, leaves), [v for v in leaves if _is_array(v)]
-        program = None
-        described = kept_programs.description(name, options, tree, kinds)
+        described = kept_programs.description(name, self._wishes(leaves), tree, kinds)
+        program = None if described is None else kept_programs.read(described)
+        if program is not None:
+            return _joined(program)
+        jitted, arrays = self._jitted(tree, leaves), [v for v in leaves if _is_array(v)]
         if described is not None:
-            program = kept_programs.read(described)
-            if program is None:
-                program = kept_programs.made(described, function, arrays, _known(options))
-        if program is None:
-            return jax.jit(function, compiler_options=_known(options))
-        return _joined(program)
+            program = kept_programs.made(described, jitted, arrays)
+        return jitted if program is None else _joined(program)
 
-    def _plain(self, leaves: list[Any]) -> Callable[..., Any]:
-        """The function as JAX compiles it for this process."""
-        few = _are_few(leaves)
-        if few not in self._jitted:
-            options = _known(self._options | (_QUICK if few else {}))
-            self._jitted[few] = eqx.filter_jit(  # pyright: ignore[reportCallIssue]
-                self._function, compiler_options=options
-            )
-        return self._jitted[few]
-
-    def _flat(self, tree: Any, leaves: list[Any]) -> Callable[..., _T]:
-        """The function of its arrays, in order."""
+    def _jitted(self, tree: Any, leaves: list[Any]) -> Any:
+        """The function of its arrays, in order; the rest of the arguments is fixed."""
         is_array = [_is_array(v) for v in leaves]
         fixed = [None if array else v for array, v in zip(is_array, leaves, strict=True)]
 
@@ -136,7 +126,11 @@ class Compiled(Generic[_P, _T]):
             )
             return self._function(*args, **kwargs)
 
-        return flat
+        flat.__name__ = self._function.__name__
+        return jax.jit(flat, compiler_options=_known(self._wishes(leaves)))
+
+    def _wishes(self, leaves: list[Any]) -> dict[str, Any]:
+        return self._options | (_QUICK if _are_few(leaves) else {})
 
 
 def _joined(program: Program) -> Callable[..., Any]:
@@ -173,13 +167,15 @@ def _is_array(leaf: Any) -> bool:
 
 def _key(tree: Any, leaves: list[Any]) -> tuple:
     """With the precision as it is now, which numbers have that have none of their own."""
-    return (tree, str(jnp.result_type(float)), *map(_kind, leaves))
+    keeps = kept_programs.folder() is not None
+    return (tree, keeps, str(jnp.result_type(float)), *map(_kind, leaves))
 
 
 def _kind(leaf: Any) -> Any:
     """What the program depends on: of an array its shape and type, else the value."""
     if not _is_array(leaf):
-        return type(leaf).__name__, leaf
+        # Of numbers as it is written, since 0.0 == -0.0.
+        return type(leaf).__name__, repr(leaf) if isinstance(leaf, float) else leaf
     return jnp.shape(leaf), str(leaf.dtype), bool(getattr(leaf, "weak_type", False))
 
 

@@ -25,12 +25,13 @@ from typing import Any, NamedTuple
 
 import jax
 
-from fitting.batch.writing import replace_file
+from fitting.batch.writing import remove_parts, replace_file
 
 _PACKAGE = Path(__file__).parent
 # Where nothing is compiled, and changes most often.
 _COMPILES_NOTHING = _PACKAGE / "cli"
 _SUFFIX = ".program"
+_HOUR = 3600.0
 _PLAIN = (type(None), bool, int, float, str)
 _folder: Path | None = None
 
@@ -49,8 +50,9 @@ def keep_in(folder: Path | None) -> None:
 
 
 def folder() -> Path | None:
-    """Where programs are kept."""
-    return _folder
+    """Where programs are kept; nowhere while a certain device is to be used."""
+    chosen = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
+    return _folder if chosen is None else None
 
 
 def description(
@@ -67,37 +69,31 @@ def description(
     return json.dumps([name, chosen, parts, arguments, _device(), *_surroundings()])
 
 
-def made(
-    described: str,
-    function: Callable[..., Any],
-    arrays: list[Any],
-    options: dict[str, Any] | None,
-) -> Program | None:
-    """The program of a function of arrays, from now on kept if that is possible.
+def made(described: str, jitted: Any, arrays: list[Any]) -> Program | None:
+    """The program of a jitted function of arrays, from now on kept if that is possible.
 
     None if it calls others, such as LAPACK's, which would have to be found again.
     """
     from jax.experimental import serialize_executable
 
-    trees: list[Any] = []
-
-    def listed(*arrays: Any) -> list[Any]:
-        results, tree = jax.tree.flatten(function(*arrays))
-        trees.append(tree)
-        return results
-
-    lowered = jax.jit(listed, compiler_options=options).lower(*arrays)
+    lowered = jitted.lower(*arrays)
     if "custom_call" in lowered.as_text():
         return None
     with _not_in_jax_cache:
         compiled = lowered.compile()
-    program = Program(compiled, trees[-1])
+
+    def run(*arrays: Any) -> list[Any]:
+        return jax.tree.leaves(compiled(*arrays))
+
+    program = Program(run, lowered.out_tree)
     with contextlib.suppress(NotImplementedError, TypeError, ValueError):
         payload, *_ = serialize_executable.serialize(compiled)
         head = [described, len(arrays), _outlined(program.out_tree)]
         content = zlib.compress(json.dumps(head).encode() + b"\n" + payload, 1)
         with contextlib.suppress(OSError):
-            replace_file(_path(described), content)
+            path = _path(described)
+            replace_file(path, content)
+            remove_parts(path.parent, older_than=_HOUR)
     return program
 
 
@@ -154,9 +150,8 @@ _not_in_jax_cache = _NotInJaxCache()
 
 
 def _device() -> list[str]:
-    chosen = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
-    device = chosen if isinstance(chosen, jax.Device) else jax.devices(chosen)[0]
-    return [device.platform, device.device_kind]
+    device = jax.devices()[0]
+    return [device.platform, device.device_kind, device.client.platform_version]
 
 
 @functools.cache

@@ -50,7 +50,7 @@ def search(rows: Rows, model: Model, options: FitOptions) -> list[Found]:
     if not options.per_channel_shape:
         return [_search_one(p, options) for p in problems(rows, model, options)]
     together = dataclasses.replace(options, per_channel_shape=False)
-    (shared,) = search(rows, model, together)
+    shared = _search_one(prepare(rows, model, together), together, last=False)
     u, x = shared.solution.u, shared.solution.x
     return [
         _search_one(p, options, (u, x[c : c + 1]))
@@ -59,9 +59,13 @@ def search(rows: Rows, model: Model, options: FitOptions) -> list[Found]:
 
 
 def _search_one(
-    p: Problem, options: FitOptions, also: tuple[ArrayLike, ArrayLike] | None = None
+    p: Problem,
+    options: FitOptions,
+    also: tuple[ArrayLike, ArrayLike] | None = None,
+    *,
+    last: bool = True,
 ) -> Found:
-    ahead.begin(p)
+    ahead.begin(p, last=last and not options.robust)
     count = max(1, options.starts) if p.unknowns.n_shape else 1
     points, x = starts.best_starts(p, count)
     begin = [*zip(points, x, strict=True), *([also] if also else [])]

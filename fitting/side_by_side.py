@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+import jax
+
 from fitting.batch.threads import allowed
 
 _T = TypeVar("_T")
@@ -21,11 +23,15 @@ def side_by_side(jobs: Sequence[Callable[[], _T]], n_values: int) -> list[_T]:
     the jobs is raised; jobs that have not begun then never do.
     """
     workers = min(allowed(), len(jobs)) if n_values <= _FEW else 1
+    if jax.config.jax_default_device is not None:  # pyright: ignore
+        # Which threads would not know of.
+        workers = 1
     if workers <= 1:
         return [job() for job in jobs]
     pool = ThreadPoolExecutor(workers)
     try:
         return [future.result() for future in [pool.submit(job) for job in jobs]]
     finally:
-        # Not waiting: an interruption is to end the program at once.
+        # Not waiting, so that an error or an interruption is told at once; what has begun
+        # goes on in a program that does.
         pool.shutdown(wait=False, cancel_futures=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 from pathlib import Path
 
 import equinox as eqx
@@ -9,8 +10,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import synthetic
 
-from fitting import Model, from_angles, kept_programs
+from fitting import Model, fit, from_angles, kept_programs
 from fitting.compiled import Compiled
 from fitting.uncertainty import Covariance
 
@@ -114,21 +116,40 @@ def test_results_keep_their_types():
         np.testing.assert_array_equal(covariance.freedom, [2, 2])
 
 
-def test_bits_are_those_of_the_function():
-    model, geometry = Model("lambert + ggx"), from_angles([0.1, 0.9], 0.0, [0.3, 0.5], 2.0)
-    values = {n: np.asarray(v) for n, v in model.defaults().items()}
+@pytest.mark.parametrize("alpha", [0.2, [0.2, 0.21]], ids=["shared", "by channel"])
+def test_bits_do_not_depend_on_whether_programs_are_kept(folder, monkeypatch, alpha):
+    model = Model("lambert + ggx")
+    geometry = from_angles(np.linspace(0, 1.5, 97), 0.0, np.linspace(1.4, 0, 97), 2.0)
+    values = {n: np.full(2, v) for n, v in model.defaults().items()}
+    values["ggx.alpha"] = np.asarray(alpha)
 
     def evaluated(model, values, geometry):
         return model(values, geometry)
 
     with jax.enable_x64(True):
         geometry = jax.tree.map(np.asarray, geometry)
-        plain = eqx.filter_jit(evaluated)(model, values, geometry)
+        monkeypatch.setattr(kept_programs, "_folder", None)
+        plain = Compiled(Counted(evaluated), None)(model, values, geometry)
+        monkeypatch.setattr(kept_programs, "_folder", folder)
         for traced in (1, 0):
             counted = Counted(evaluated)
             kept = Compiled(counted, None)(model, values, geometry)
             np.testing.assert_array_equal(kept, plain)
             assert counted.traced == traced
+
+
+def test_a_device_that_was_chosen_is_used(folder):
+    device = jax.devices()[0]
+    with jax.default_device(device):
+        out = Compiled(Counted(), None)(np.ones(2), np.ones(2), "+")
+    assert out.devices() == {device}
+    assert not _files(folder)
+
+
+def test_zero_has_a_sign():
+    function = Compiled(Counted(lambda a, s: jnp.copysign(a, s)), None)
+    assert function(np.ones(1), 0.0)[0] == 1
+    assert function(np.ones(1), -0.0)[0] == -1
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "another"])
@@ -214,22 +235,29 @@ def test_what_goes_wrong_in_the_background_is_said_where_it_is_needed():
         function(np.ones(2))
 
 
-def test_a_fit_uses_all_that_was_begun_for_it():
-    from concurrent.futures import Future
+ALL = {"refine", "_noise_sums", "_moments", "_dense_albedo"}
 
-    import synthetic
 
-    from fitting import fit, solve, uncertainty, violations
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [({}, ALL), ({"robust": True}, {"refine"}), ({"per_channel_shape": True}, ALL)],
+    ids=["plain", "robust", "per channel"],
+)
+def test_a_fit_uses_all_that_was_begun_for_it(monkeypatch, options, expected):
+    begun: list[tuple[Compiled, object]] = []
+    plainly = Compiled.begin
 
+    def begin(self, *args, **kwargs):
+        before = set(self._ready)
+        plainly(self, *args, **kwargs)
+        begun.extend((self, key) for key in set(self._ready) - before)
+
+    monkeypatch.setattr(Compiled, "begin", begin)
     truth = {"lambert.albedo": [0.3, 0.2], "ggx.alpha": 0.2}
     truth |= {"ggx.f0": [0.05, 0.06], "ggx.f90": [1.0, 1.0]}
     data = synthetic.measurement("lambert + ggx", truth, relative=0.02)
-    fit(data, "lambert + ggx", cross_validate=False)
-    begun = (
-        solve.refine, uncertainty._noise_sums, uncertainty._moments,
-        violations._dense_albedo,
-    )  # fmt: skip
-    for function in begun:
-        assert function._ready
-        assert not any(isinstance(v, Future) for v in function._ready.values())
+    fit(data, "lambert + ggx", cross_validate=False, **options)
+    assert {function.__name__ for function, _ in begun} == expected
+    assert not any(isinstance(function._ready[key], Future) for function, key in begun)
+    for function, _ in begun:
         function.forget()

@@ -131,8 +131,7 @@ def test_the_loop_of_the_solver_holds_nothing_of_the_size_of_the_rows():
         p = dataclasses.replace(p, chunk=4096)
         x = jnp.full((3, 3), 0.1)
         with haste.compiling(in_haste=False):
-            lowered = refine.lower(p, jnp.zeros(1), x)  # pyright: ignore
-            compiled = lowered.compile().compiled
+            compiled = refine.lower(p, jnp.zeros(1), x).compile()
         analysis = compiled.memory_analysis()
     if analysis is None:
         pytest.skip("XLA has no memory analysis on this platform")

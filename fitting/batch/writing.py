@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
+import time
 from pathlib import Path
 
 _BESIDE = ".part"
@@ -22,20 +24,26 @@ def replace_file(target: Path, data: bytes, *, beside: Path | None = None) -> No
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        os.chmod(name, 0o666 & ~_umask())
+        os.chmod(name, 0o666 & ~_UMASK)
         os.replace(name, target)
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
 
 
-def remove_parts(folder: Path) -> None:
-    """Remove what writers left that were killed."""
+def remove_parts(folder: Path, *, older_than: float = 0.0) -> None:
+    """Remove what writers left that were killed, so many seconds ago or more."""
     for path in folder.glob(f"*{_BESIDE}"):
-        path.unlink(missing_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            if time.time() - path.stat().st_mtime >= older_than:
+                path.unlink()
 
 
 def _umask() -> int:
     current = os.umask(0)
     os.umask(current)
     return current
+
+
+# Once, since to ask for it is to change it, for all threads.
+_UMASK = _umask()

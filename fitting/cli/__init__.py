@@ -39,7 +39,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             _leave_at_once(failures.GOOD)
         return failures.GOOD
     except Exception as error:  # The outermost edge: people get a sentence.
-        return failures.report(error, debug)
+        code = failures.report(error, debug)
+        if argv is None and not debug:
+            # Not waiting for what is still computed or compiled in the background.
+            _leave_at_once(code)
+        return code
 
 
 def _run(tokens: list[str]) -> int:

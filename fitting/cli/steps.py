@@ -55,7 +55,7 @@ class Steps:
 
         def say(what: str) -> None:
             nonlocal first
-            what += " (compiling, once per model)" if first else ""
+            what += " (compiling first, unless it was before)" if first else ""
             first = False
             self._say(model, what)
 

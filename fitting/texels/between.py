@@ -38,10 +38,11 @@ def minimum(
     ``cost`` is that of every `EVERY`-th candidate, of which the ``best`` is one. A parabola
     through three costs, and from its minimum a step of Newton's method.
     """
-    three = jnp.clip(best, 1, cost.shape[0] - 2) + _THREE[:, None]
+    middle = jnp.clip(best, 1, cost.shape[0] - 2)
+    three = middle + _THREE[:, None]
     below, here, above = at(cost[None], three)[0]
     step = _step(0.5 * (above - below), below - 2.0 * here + above)
-    place = EVERY * (best.astype(cost.dtype) + step)
+    place = EVERY * (middle.astype(cost.dtype) + step)
     nearest = jnp.round(place).astype(best.dtype)
     centre = jnp.clip(nearest, _HALF, task.points.shape[0] - 1 - _HALF)
     place = place - centre.astype(place.dtype)

@@ -85,5 +85,5 @@ def solver_memory(measurement: Measurement, model: str, options: FitOptions) -> 
         k, m = problem.unknowns.n_shape, problem.unknowns.n_coefficients
         x = jnp.zeros((problem.target.shape[0], m))
         lowered = refine.lower(problem, jnp.zeros(k), x)
-        analysis = lowered.compile().compiled.memory_analysis()
+        analysis = lowered.compile().memory_analysis()
     return None if analysis is None else int(analysis.temp_size_in_bytes)

@@ -85,9 +85,11 @@ def test_asked_to_end(folder: Path, number: signal.Signals, code: int):
     assert "Traceback" not in err
     assert not any(psutil.pid_exists(w.pid) for w in fitting)
     before = results(out)
-    assert f"{FILES - len(before)} left" in said
     with (out / "summary.csv").open() as file:
-        assert len(list(csv.DictReader(file))) == len(before)
+        listed = len(list(csv.DictReader(file)))
+    assert f"{FILES - listed} left" in said
+    # A result whose receipt was not written any more is not listed, and made again.
+    assert listed <= len(before) <= listed + 1
     if number == signal.SIGTERM:
         finish(folder, before)
 

@@ -229,7 +229,7 @@ def temporary_bytes(rows: int, channels: int) -> int:
         )
         assert problem.target.shape == (channels, rows)
         lowered = refine.lower(problem, jnp.zeros(1), jnp.ones((channels, 3)))
-        analysis = lowered.compile().compiled.memory_analysis()
+        analysis = lowered.compile().memory_analysis()
     if analysis is None:
         pytest.skip("XLA has no memory analysis on this platform")
     return analysis.temp_size_in_bytes
