@@ -36,23 +36,30 @@ _REGIONS = Path("/proc/self/maps")
 
 
 def compiled(
-    options: dict[str, Any] | None = None,
+    options: dict[str, Any] | None = None, *, quickly: bool = True
 ) -> Callable[[Callable[_P, _T]], Compiled[_P, _T]]:
     """Decorate a pure function of arrays; ``options`` are the compiler's.
 
-    As with `equinox.filter_jit`, arrays are traced, and whatever else is among the
-    arguments is a part of the program. The function returns arrays in tuples.
+    For short arrays it is compiled ``quickly``, unless it is called many times. As with
+    `equinox.filter_jit`, arrays are traced, and whatever else is among the arguments is a
+    part of the program. The function returns arrays in tuples.
     """
-    return lambda function: Compiled(function, options)
+    return lambda function: Compiled(function, options, quickly=quickly)
 
 
 class Compiled(Generic[_P, _T]):
     """What `compiled` makes of a function."""
 
-    def __init__(self, function: Callable[_P, _T], options: dict[str, Any] | None):
+    def __init__(
+        self,
+        function: Callable[_P, _T],
+        options: dict[str, Any] | None = None,
+        *,
+        quickly: bool = True,
+    ):
         functools.update_wrapper(self, function)
         self._function: Callable[..., _T] = function
-        self._options = options or {}
+        self._options, self._quickly = options or {}, quickly
         self._ready: dict[Any, Callable[..., Any] | Future] = {}
         _all.add(self)
 
@@ -126,11 +133,15 @@ class Compiled(Generic[_P, _T]):
             )
             return self._function(*args, **kwargs)
 
-        flat.__name__ = self._function.__name__
+        # Under another name, lest one that is to be kept comes out of JAX's own cache: what
+        # was read there cannot be written again.
+        keeps = kept_programs.folder() is not None
+        flat.__name__ = self._function.__name__ + ("_kept" if keeps else "")
         return jax.jit(flat, compiler_options=_known(self._wishes(leaves)))
 
     def _wishes(self, leaves: list[Any]) -> dict[str, Any]:
-        return self._options | (_QUICK if _are_few(leaves) else {})
+        quick = self._quickly and _are_few(leaves)
+        return self._options | (_QUICK if quick else {})
 
 
 def _joined(program: Program) -> Callable[..., Any]:
@@ -168,7 +179,7 @@ def _is_array(leaf: Any) -> bool:
 def _key(tree: Any, leaves: list[Any]) -> tuple:
     """With the precision as it is now, which numbers have that have none of their own."""
     keeps = kept_programs.folder() is not None
-    return (tree, keeps, str(jnp.result_type(float)), *map(_kind, leaves))
+    return (tree, keeps, jnp.result_type(float), *map(_kind, leaves))
 
 
 def _kind(leaf: Any) -> Any:
@@ -176,7 +187,7 @@ def _kind(leaf: Any) -> Any:
     if not _is_array(leaf):
         # Of numbers as it is written, since 0.0 == -0.0.
         return type(leaf).__name__, repr(leaf) if isinstance(leaf, float) else leaf
-    return jnp.shape(leaf), str(leaf.dtype), bool(getattr(leaf, "weak_type", False))
+    return leaf.shape, leaf.dtype, bool(getattr(leaf, "weak_type", False))
 
 
 _all: weakref.WeakSet[Compiled] = weakref.WeakSet()

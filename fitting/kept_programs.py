@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
+import numpy as np
 
 from fitting.batch.writing import remove_parts, replace_file
 
@@ -121,7 +122,7 @@ def _path(described: str) -> Path:
 
 
 class _NotInJaxCache:
-    """What JAX has read from its own cache cannot be written again: these are not there.
+    """What is kept here is not kept by JAX too, which could not be read and kept again.
 
     The setting is one for all threads: the first in makes it, the last out undoes it.
     """
@@ -182,13 +183,15 @@ def _processor() -> str:
 
 
 def _described(value: Any) -> Any:
-    """Plain values and tuples of them as such; raises TypeError for others."""
+    """Plain values, types of arrays, tuples of them; raises TypeError for others."""
     if isinstance(value, tuple | list):
         return [_described(v) for v in value]
     if isinstance(value, float | int) and type(value) in _PLAIN:
         return [type(value).__name__, repr(value)]
     if type(value) in _PLAIN:
         return value
+    if isinstance(value, np.dtype):
+        return value.name
     raise TypeError(f"not a plain value: {value!r}")
 
 

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import synthetic
+from jax.experimental.compilation_cache import compilation_cache
 
 from fitting import Model, fit, from_angles, kept_programs
 from fitting.compiled import Compiled
@@ -150,6 +151,28 @@ def test_zero_has_a_sign():
     function = Compiled(Counted(lambda a, s: jnp.copysign(a, s)), None)
     assert function(np.ones(1), 0.0)[0] == 1
     assert function(np.ones(1), -0.0)[0] == -1
+
+
+def test_what_jax_has_kept_is_not_kept_again(folder, monkeypatch, tmp_path_factory):
+    """A program that JAX read from its own cache cannot be written any more."""
+    settings = {
+        "jax_compilation_cache_dir": str(tmp_path_factory.mktemp("jax")),
+        "jax_persistent_cache_min_compile_time_secs": 0.0,
+    }
+    before = {name: getattr(jax.config, name) for name in settings}
+    compilation_cache.reset_cache()
+    for name, value in settings.items():
+        jax.config.update(name, value)
+    try:
+        for kept in (None, folder, None, folder, folder):
+            monkeypatch.setattr(kept_programs, "_folder", kept)
+            jax.clear_caches()
+            out = Compiled(Counted(), None)(np.ones(2), np.ones(2), "+")
+            np.testing.assert_array_equal(out, [2, 2])
+    finally:
+        for name, value in before.items():
+            jax.config.update(name, value)
+        compilation_cache.reset_cache()
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "another"])

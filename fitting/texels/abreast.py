@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
 from fitting import row_sums
+from fitting.compiled import compiled
 from fitting.texels.descent import State, begin, descend
 from fitting.texels.outcome import Outcome, outcome
 from fitting.texels.scan import Starts, scan
@@ -50,40 +49,6 @@ def lanes() -> Lanes:
     return Lanes(16_368, 1)
 
 
-class Compiled:
-    """Calls functions of a task, compiled with sums reassociated: in another order, the
-    same for every texel.
-
-    The task is taken apart once and not at every call, which would cost as much as fits.
-    """
-
-    def __init__(self, task: Task):
-        leaves, self._tree = jax.tree.flatten(task)
-        are = [eqx.is_array(v) for v in leaves]
-        self._others = tuple(None if a else v for a, v in zip(are, leaves, strict=True))
-        self._arrays = [jnp.asarray(v) for a, v in zip(are, leaves, strict=True) if a]
-        self._found: dict[Callable, Callable] = {}
-        self.task = task
-
-    def __call__(self, function: Callable, *arguments: Any, **static: Any) -> Any:
-        """``function(task, *arguments, **static)``."""
-        found = self._found.get(function)
-        if found is None:
-            found = _jitted(function, self._tree, self._others)
-            self._found[function] = found
-        return found(self._arrays, *arguments, **static)
-
-
-@functools.lru_cache(maxsize=64)
-def _jitted(function: Callable, tree: Any, others: tuple[Any, ...]) -> Callable:
-    def call(arrays: list[Array], *arguments: Any, **static: Any) -> Any:
-        known = iter(arrays)
-        leaves = [next(known) if v is None else v for v in others]
-        return function(jax.tree.unflatten(tree, leaves), *arguments, **static)
-
-    return jax.jit(call, static_argnames="own_weights", compiler_options=_OPTIONS)
-
-
 class Data(NamedTuple):
     """Of texels: ``values (t, n, c)`` of all rows as in the file, and ``sigma`` if any."""
 
@@ -106,6 +71,7 @@ class Texels(NamedTuple):
     size: Array
 
 
+@compiled(_OPTIONS, quickly=False)
 def arranged(task: Task, data: Data, count: Array, *, own_weights: bool) -> Texels:
     """With weights of their own where not every value of a texel is known."""
     padding = ((0, 0), (0, 0), (0, task.heavy.shape[-1] - task.rows.size))
@@ -131,6 +97,7 @@ def arranged(task: Task, data: Data, count: Array, *, own_weights: bool) -> Texe
     return Texels(_split(heavy), _split(values), used, count)
 
 
+@compiled(_OPTIONS, quickly=False)
 def scanned(task: Task, texels: Texels) -> tuple[Starts, State]:
     """Where they begin, and the states there."""
 
@@ -141,16 +108,19 @@ def scanned(task: Task, texels: Texels) -> tuple[Starts, State]:
     return _abreast(some, texels)
 
 
+@compiled(_OPTIONS, quickly=False)
 def begun(task: Task, u: Array, x: Array) -> State:
     """States before descents from ``u (t, k)`` and ``x (t, c, m)``."""
     return jax.vmap(functools.partial(begin, task))(u, x)
 
 
-def gone_on(task: Task, texels: Texels, state: State, until: Array) -> State:
+@compiled(_OPTIONS, quickly=False)
+def gone_on(task: Task, texels: Texels, state: State, until: Array | np.ndarray) -> State:
     """After ``until`` steps in all, or at the end."""
     return _each(functools.partial(descend, task, until=until), texels, state)
 
 
+@compiled(_OPTIONS, quickly=False)
 def finished(task: Task, texels: Texels, state: State) -> Outcome:
     """What is known at the ends."""
     return _each(functools.partial(outcome, task), texels, state, texels.used)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from fitting.reduced import Blocks
@@ -77,7 +78,7 @@ def descend(
     heavy: Float[Array, "w n"],
     values: Float[Array, "c n"],
     state: State,
-    until: Int[Array, ""],
+    until: Int[Array, ""] | np.ndarray,
 ) -> State:
     """Steps until the texel is finished or has taken ``until`` of them."""
     scale = jnp.sum((heavy * values) ** 2)

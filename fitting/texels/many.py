@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Array
 
 from fitting.texels.abreast import (
-    Compiled,
     Data,
     Texels,
     arranged,
@@ -53,32 +52,31 @@ def fit_chunk(
     ``single_first``: descend in float32 and then on in float64, for GPUs that are slow at
     the latter. Call with x64 enabled.
     """
-    run, data = Compiled(task), Data(values, sigma)
-    out, complete = _fit(run, data, own_weights=sigma is not None, single=single_first)
+    data = Data(values, sigma)
+    out, complete = _fit(task, data, own_weights=sigma is not None, single=single_first)
     other = np.flatnonzero(~complete)
     if other.size and sigma is None:
         some = _taken(data, other)
-        found, _ = _fit(run, some, own_weights=True, single=single_first)
+        found, _ = _fit(task, some, own_weights=True, single=single_first)
         for name, v in found.items():
             out[name][other] = v
     return out
 
 
 def _fit(
-    run: Compiled, data: Data, *, own_weights: bool, single: bool
+    task: Task, data: Data, *, own_weights: bool, single: bool
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Of texels whose weights are their own, or those of all; and which are complete, as
     the latter have to be."""
-    task = run.task
     few = np.asarray(_FIRST_STEPS if task.even else _FEW_STEPS)
 
     def first(count: Any, some: Data) -> tuple[Outcome, State, Starts, Array]:
-        texels = run(arranged, some, count, own_weights=own_weights)
-        starts, state = run(scanned, texels)
+        texels = arranged(task, some, count, own_weights=own_weights)
+        starts, state = scanned(task, texels)
         if single:
-            state = _roughly(run, texels, state, few)
-        state = run(gone_on, texels, state, few)
-        return run(finished, texels, state), state, starts, texels.used
+            state = _roughly(task, texels, state, few)
+        state = gone_on(task, texels, state, few)
+        return finished(task, texels, state), state, starts, texels.used
 
     outcome, state, starts, used = _in_batches(first, data)
     state.done[:] &= outcome.as_promised
@@ -89,7 +87,7 @@ def _fit(
     left = ~state.done | second | _flat(task, state).any(axis=1)
     rest = np.flatnonzero(left if own_weights else left & complete)
     if rest.size:
-        some = _Rest(run, _taken(data, rest), own_weights)
+        some = _Rest(task, _taken(data, rest), own_weights)
         new = some.refined(_taken(state, rest))
         ratio[rest] = some.best_of_two(new, _taken(starts, rest), second[rest])
         _replace(outcome, rest, some.finished(new))
@@ -99,7 +97,7 @@ def _fit(
 class _Rest(NamedTuple):
     """Texels that take longer than most."""
 
-    run: Compiled
+    task: Task
     data: Data
     own_weights: bool
 
@@ -107,12 +105,12 @@ class _Rest(NamedTuple):
         """The ends of descents; once more from inside where a shape ended on the flat part
         of its support's map."""
         state = self._descended(state)
-        flat = _flat(self.run.task, state)
+        flat = _flat(self.task, state)
         again = np.flatnonzero(flat.any(axis=1))
         if again.size:
             u = np.where(flat, np.sign(state.u) * _INSIDE, state.u)[again]
             some = self._replace(data=_taken(self.data, again))
-            new = some._descended(_begun(self.run, u, state.blocks.x[again]))
+            new = some._descended(_begun(self.task, u, state.blocks.x[again]))
             _replace(state, again, new, new.blocks.cost < state.blocks.cost[again])
         return state
 
@@ -124,7 +122,7 @@ class _Rest(NamedTuple):
         if index.size:
             some = self._replace(data=_taken(self.data, index))
             u, x = starts.u[index, 1], starts.x[index, 1]
-            other = some.refined(_begun(self.run, u, x))
+            other = some.refined(_begun(self.task, u, x))
             costs = np.stack([state.blocks.cost[index], other.blocks.cost])
             costs = np.where(np.isfinite(costs), costs, np.inf)
             _replace(state, index, other, costs[1] < costs[0])
@@ -137,8 +135,8 @@ class _Rest(NamedTuple):
         """What is known of them at the end."""
 
         def finish(count: Any, data: Data, some: State) -> Outcome:
-            texels = self.run(arranged, data, count, own_weights=self.own_weights)
-            return self.run(finished, texels, some)
+            texels = arranged(self.task, data, count, own_weights=self.own_weights)
+            return finished(self.task, texels, some)
 
         return _in_batches(finish, self.data, state)
 
@@ -149,8 +147,8 @@ class _Rest(NamedTuple):
                 break
 
             def go_on(count: Any, data: Data, some: State, until: int = until) -> State:
-                texels = self.run(arranged, data, count, own_weights=self.own_weights)
-                return self.run(gone_on, texels, some, np.asarray(until))
+                texels = arranged(self.task, data, count, own_weights=self.own_weights)
+                return gone_on(self.task, texels, some, np.asarray(until))
 
             some = _taken(self.data, waiting), _taken(state, waiting)
             new = _in_batches(go_on, *some)
@@ -165,26 +163,27 @@ def _flat(task: Task, state: State) -> np.ndarray:
     return (np.abs(state.u) > _FLAT) & ~periodic
 
 
-def _roughly(run: Compiled, texels: Texels, state: State, few: Any) -> State:
+def _roughly(task: Task, texels: Texels, state: State, few: Any) -> State:
     """The beginning of a descent in float64 where one in float32 ended.
 
     That has few steps, since rounding would hide the end.
     """
-    single = Compiled(jax.tree.map(_single, run.task))
-    rough = single(gone_on, *jax.tree.map(_single, (texels, state)), few)
+    single = jax.tree.map(_single, task)
+    some, at = jax.tree.map(_single, (texels, state))
+    rough = gone_on(single, some, at, few)
     usable = jnp.isfinite(rough.blocks.cost)
     u = jnp.where(usable[:, None], rough.u, state.u)
     x = jnp.where(usable[:, None, None], rough.blocks.x, state.blocks.x)
-    return run(begun, u.astype(state.u.dtype), x.astype(state.u.dtype))
+    return begun(task, u.astype(state.u.dtype), x.astype(state.u.dtype))
 
 
 def _single(v: Any) -> Any:
     return v.astype(jnp.float32) if jnp.issubdtype(v.dtype, jnp.floating) else v
 
 
-def _begun(run: Compiled, u: Any, x: Any) -> State:
+def _begun(task: Task, u: Any, x: Any) -> State:
     """The states before descents from ``u (t, k)`` and ``x (t, c, m)``."""
-    return _in_batches(lambda _, *some: run(begun, *some), u, x)
+    return _in_batches(lambda _, *some: begun(task, *some), u, x)
 
 
 def _taken(arrays: Any, index: np.ndarray) -> Any:
