@@ -263,8 +263,13 @@ ALL = {"refine", "_noise_sums", "_moments", "_dense_albedo"}
 
 @pytest.mark.parametrize(
     ("options", "expected"),
-    [({}, ALL), ({"robust": True}, {"refine"}), ({"per_channel_shape": True}, ALL)],
-    ids=["plain", "robust", "per channel"],
+    [
+        pytest.param({}, ALL, id="plain"),
+        pytest.param({"robust": True}, {"refine"}, id="robust", marks=pytest.mark.slow),
+        pytest.param(
+            {"per_channel_shape": True}, ALL, id="per channel", marks=pytest.mark.slow
+        ),
+    ],
 )
 def test_a_fit_uses_all_that_was_begun_for_it(monkeypatch, options, expected):
     begun: list[tuple[Compiled, object]] = []
