@@ -6,6 +6,7 @@ Exit codes: 0 good, 1 the fit did not converge (or `brdf doctor` found a problem
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import sys
@@ -42,6 +43,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = failures.report(error, debug)
         if argv is None and not debug:
             # Not waiting for what is still computed or compiled in the background.
+            with contextlib.suppress(BrokenPipeError):
+                sys.stdout.flush()
             _leave_at_once(code)
         return code
 

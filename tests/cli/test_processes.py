@@ -1,4 +1,4 @@
-"""What a command loads: nothing that it does not need, since people wait for imports."""
+"""Commands as processes: what they load, which people wait for, and how they end."""
 
 from __future__ import annotations
 
@@ -51,3 +51,19 @@ def test_a_fit_loads_what_it_needs_and_a_second_one_no_solver(tmp_path):
     assert not second & {*HEAVY, "optimistix", "lineax"}
     # A count, so that what creeps in by and by is noticed: 1,300 when this was written.
     assert len(second) < 1450
+
+
+def test_what_was_said_before_an_error_is_not_lost(tmp_path):
+    """Also in a file or a pipe, where it waits in a buffer; the program ends at once."""
+    program = (
+        "import sys; from fitting import cli; "
+        "cli._run = lambda tokens: (print('half of it'), 1 / 0); sys.exit(cli.main())"
+    )
+    buffered = {k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"}
+    done = subprocess.run(
+        [sys.executable, "-c", program, "fit"], cwd=tmp_path, capture_output=True,
+        text=True, encoding="utf-8", env=buffered | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert done.returncode == 70
+    assert done.stdout == "half of it\n"
+    assert "internal error" in done.stderr
