@@ -33,6 +33,8 @@ _PACKAGE = Path(__file__).parent
 _COMPILES_NOTHING = _PACKAGE / "cli"
 _SUFFIX = ".program"
 _HOUR = 3600.0
+# To JAX's setting of how long a program has to be compiled for it to be kept.
+NEVER = 1e9
 _PLAIN = (type(None), bool, int, float, str)
 _folder: Path | None = None
 
@@ -57,14 +59,14 @@ def folder() -> Path | None:
 
 
 def description(
-    name: str, options: dict[str, Any] | None, tree: Any, kinds: list[Any]
+    name: str, options: dict[str, Any], tree: Any, kinds: list[Any]
 ) -> str | None:
     """Everything that a program depends on, or None if that cannot be told: for a lobe of
     somebody else's, whose source may change."""
     try:
         parts = [*_described_tree(tree)]
         arguments = [_described(k) for k in kinds]
-        chosen = _described(sorted((options or {}).items()))
+        chosen = _described(sorted(options.items()))
     except TypeError:
         return None
     return json.dumps([name, chosen, parts, arguments, _device(), *_surroundings()])
@@ -128,7 +130,6 @@ class _NotInJaxCache:
     """
 
     _NAME = "jax_persistent_cache_min_compile_time_secs"
-    _NEVER = 1e9
 
     def __init__(self) -> None:
         self._lock, self._inside, self._before = threading.Lock(), 0, 0.0
@@ -137,7 +138,7 @@ class _NotInJaxCache:
         with self._lock:
             if not self._inside:
                 self._before = getattr(jax.config, self._NAME)
-                jax.config.update(self._NAME, self._NEVER)
+                jax.config.update(self._NAME, NEVER)
             self._inside += 1
 
     def __exit__(self, *_: object) -> None:
@@ -231,8 +232,10 @@ def _outlined(tree: Any) -> Any:
 
 def _rebuilt(outline: Any) -> Any:
     """Numbers in the tuples of an outline; of named ones only those of this package."""
-    if outline is None or outline == "*":
-        return outline and 0
+    if outline is None:
+        return None
+    if outline == "*":
+        return 0
     name, *children = outline
     values = [_rebuilt(v) for v in children]
     if name == "builtins:tuple":

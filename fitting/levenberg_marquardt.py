@@ -18,6 +18,7 @@ from jaxtyping import Array
 
 from fitting import qp, reduced
 from fitting.reduced import Blocks, Problem
+from fitting.solve import Solution
 
 _MAX_STEPS = 200
 _MAX_SHAPE_STEP = 1.5
@@ -26,17 +27,7 @@ _NOTICEABLE = 1e-10
 _MAX_IDLE = 8
 
 
-class Descent(NamedTuple):
-    """Where it ended: the unknowns, the blocks there, and how it got there."""
-
-    u: Array
-    x: Array
-    blocks: Blocks
-    steps: Array
-    converged: Array
-
-
-def descend(problem: Problem, u0: Array, x0: Array, rtol: Array | None = None) -> Descent:
+def descend(problem: Problem, u0: Array, x0: Array, rtol: Array | None = None) -> Solution:
     """From a start to the nearest minimum."""
     solver = ArrowLevenbergMarquardt()
     if rtol is not None:
@@ -49,8 +40,11 @@ def descend(problem: Problem, u0: Array, x0: Array, rtol: Array | None = None) -
         fn, solver, (u0, x0), args=problem, max_steps=_MAX_STEPS,
         adjoint=_PlainLoop(), throw=False,
     )  # fmt: skip
-    converged = out.result == optx.RESULTS.successful
-    return Descent(*out.value, out.stats["blocks"], out.stats["num_steps"], converged)
+    u, x = out.value
+    return Solution(
+        u, x, out.stats["blocks"].cost, out.stats["blocks"], out.stats["num_steps"],
+        out.result == optx.RESULTS.successful,
+    )  # fmt: skip
 
 
 class _State(NamedTuple):

@@ -69,10 +69,11 @@ def _search_one(
     count = max(1, options.starts) if p.unknowns.n_shape else 1
     points, x = starts.best_starts(p, count)
     begin = [*zip(points, x, strict=True), *([also] if also else [])]
-    return _best(p, [_pulled_back(p, _refined(p, u, c)) for u, c in begin])
+    return _best(p, [_pulled_back(p, refined(p, u, c)) for u, c in begin])
 
 
-def _refined(p: Problem, u: ArrayLike, x: ArrayLike) -> Solution:
+def refined(p: Problem, u: ArrayLike, x: ArrayLike) -> Solution:
+    """The minimum from one start, as numpy."""
     return jax.device_get(refine(p, *jax.device_put((u, x))))
 
 
@@ -88,7 +89,7 @@ def _pulled_back(p: Problem, end: Solution) -> Solution:
         stuck = (np.abs(u) > _FLAT) & ~periodic
         if not stuck.any():
             break
-        new = _refined(p, np.where(stuck, np.sign(u) * _INSIDE, u), end.x)
+        new = refined(p, np.where(stuck, np.sign(u) * _INSIDE, u), end.x)
         if not float(new.cost) < float(end.cost) * (1.0 - _BETTER):
             break
         end = new
@@ -106,8 +107,7 @@ def again(
     """Refit with other residuals, from every end: the order of the minima may change."""
     out: list[Found] = []
     for p, before in zip(problems(rows, model, options, **kwargs), found, strict=True):
-        begin = [(e.u, e.x) for e in before.ends]
-        out.append(_best(p, [jax.device_get(refine(p, u, x)) for u, x in begin]))
+        out.append(_best(p, [refined(p, e.u, e.x) for e in before.ends]))
     return out
 
 

@@ -38,8 +38,7 @@ def refine(
     # Only where it has to be traced: loading optimistix takes longer than the fit.
     from fitting.levenberg_marquardt import descend
 
-    u, x, blocks, steps, converged = descend(problem, u0, x0, rtol)
-    return Solution(u, x, blocks.cost, blocks, steps, converged)
+    return descend(problem, u0, x0, rtol)
 
 
 @compiled(row_sums.FAST)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import jax
 import numpy as np
 
 from fitting import judge
@@ -13,8 +12,7 @@ from fitting.model import Model
 from fitting.options import FitOptions
 from fitting.result import CrossValidation
 from fitting.rows import Rows
-from fitting.search import predicted_by, problems
-from fitting.solve import refine
+from fitting.search import predicted_by, problems, refined
 from fitting.summary import Found
 
 
@@ -62,6 +60,6 @@ def held_out_predictions(
         kwargs: dict[str, Any] = {"robust_width": width, "row_weights": keep}
         kwargs["penalised"] = found[0].problem.penalised
         for p, f in zip(problems(rows, model, options, **kwargs), found, strict=True):
-            ends.append(Found(p, jax.device_get(refine(p, f.solution.u, f.solution.x)), ()))
+            ends.append(Found(p, refined(p, f.solution.u, f.solution.x), ()))
         out[held] = predicted_by(ends, rows)[held]
     return out

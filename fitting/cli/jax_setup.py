@@ -15,7 +15,6 @@ from fitting.batch.threads import cores, same_sums
 
 OVERRIDE = "BRDF_CACHE_DIR"
 _JAX_OWN = "JAX_COMPILATION_CACHE_DIR"
-_NEVER = 1e9
 
 
 def cache_folder() -> Path | None:
@@ -54,15 +53,14 @@ def set_up() -> None:
 
     from fitting import kept_programs
 
-    folder = cache_folder()
-    writable = folder is not None and is_writable(folder)
+    folder, writable = cache_folder(), writable_cache()
     # One that others have filled is used also where it may only be read.
-    usable = folder if folder is not None and (writable or folder.is_dir()) else None
+    usable = folder if writable or (folder is not None and folder.is_dir()) else None
     kept_programs.keep_in(usable)
     if usable is None:
         return
     jax.config.update("jax_compilation_cache_dir", str(usable))
-    least = 0.0 if writable else _NEVER
+    least = 0.0 if writable else kept_programs.NEVER
     jax.config.update("jax_persistent_cache_min_compile_time_secs", least)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
 

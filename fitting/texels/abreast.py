@@ -61,7 +61,7 @@ class Texels(NamedTuple):
 
     ``heavy`` are weights ``(w, n)`` for all texels or, as are ``values``, so many at a time
     with the spare ones: ``(blocks, abreast, w, n)`` and ``(blocks, abreast, c, n)``. ``used
-    (t, c)`` tells how many values are known. Texels after the first ``count`` are not
+    (t, c)`` tells how many values are known. Texels after the first ``size`` are not
     looked at.
     """
 
