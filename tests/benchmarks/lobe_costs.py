@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import ModuleType
@@ -27,7 +28,8 @@ from fitting.tradeoff.evaluation_cost import Kernel, Precision, directions
 from fitting.tradeoff.timing import timed
 
 COUNT = 1 << 17
-REPEATS = 7
+# Rounds in which every kernel has its turn: a burst of other load disturbs a few of all.
+ROUNDS, FEWEST_ROUNDS, SECONDS = 60, 5, 0.6
 HEADER = (
     "| lobe | value, f32 | f64 | Jacobian, f32 | f64 | numpy / compiled, f64 | flops | "
     "transcendentals |\n|---|---|---|---|---|---|---|---|"
@@ -85,16 +87,16 @@ def cost(expression: str, count: int = COUNT) -> Cost:
         slopes = jax.jacfwd(lobe.basis)(shape, geometry) if shape else ()
         return lobe.basis(shape, geometry), slopes
 
-    value: dict[str, float] = {}
-    jacobian: dict[str, float] = {}
-    counted = (0.0, 0.0)
     precisions: dict[str, Precision] = {"f32": "float32", "f64": "float64"}
-    for name, precision in precisions.items():
-        of_value = Kernel(lobe.basis, plain, g, precision=precision)
-        of_both = Kernel(with_tangents, plain, g, precision=precision)
-        value[name] = _per_evaluation(of_value, count)
-        jacobian[name] = _per_evaluation(of_both, count)
-        counted = of_value.counted()
+    of_value, of_both = (
+        {n: Kernel(f, plain, g, precision=p) for n, p in precisions.items()}
+        for f in (lobe.basis, with_tangents)
+    )
+    seconds = _least([*of_value.values(), *of_both.values()]) / count
+    value, jacobian = (
+        dict(zip(precisions, map(float, s), strict=True)) for s in np.split(seconds, 2)
+    )
+    counted = of_value["f64"].counted()
     few = directions(count // 8)
     numbers = {n: np.float64(v) for n, v in plain.items()}
     with plain_numpy(), np.errstate(all="ignore"):
@@ -102,9 +104,19 @@ def cost(expression: str, count: int = COUNT) -> Cost:
     return Cost(value, jacobian, numpy, counted[0] / count, counted[1] / count)
 
 
-def _per_evaluation(kernel: Kernel, count: int) -> float:
-    # The least time is what other load disturbs least.
-    return timed(kernel.run, REPEATS, warm=False).least / count
+def _least(kernels: list[Kernel]) -> np.ndarray:
+    """Least seconds of every kernel, in rounds: what other load disturbs least."""
+    for kernel in kernels:
+        kernel.run()
+    least, begin = np.full(len(kernels), np.inf), time.perf_counter()
+    for done in range(ROUNDS):
+        if done >= FEWEST_ROUNDS and time.perf_counter() - begin > SECONDS:
+            break
+        for i, kernel in enumerate(kernels):
+            start = time.perf_counter()
+            kernel.run()
+            least[i] = min(least[i], time.perf_counter() - start)
+    return least
 
 
 def row(name: str, own: Cost, unit: float) -> str:
