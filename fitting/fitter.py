@@ -44,7 +44,6 @@ _SAME_COST = 1e-6
 _ROUNDING = 1e-16
 _NOTICEABLY_COSTLIER = 1.001
 _FAR_COSTLIER = 1e4
-_NOISE_ROUNDS = 2
 
 
 def fit(
@@ -98,7 +97,7 @@ def _fit(
     found = search(rows, model, options)
     if objective == "chi2" and (rows.sigma is None or options.noise is not None):
         # Weights from noisy values favour the low ones; weights from the fit do not.
-        for _ in range(_NOISE_ROUNDS):
+        for _ in range(problem.NOISE_ROUNDS):
             rows = with_noise_of(rows, predicted_by(found, rows))
             found = again(rows, model, options, found)
     width = math.inf

@@ -25,6 +25,10 @@ from fitting.unknowns import make_unknowns
 _RECIPROCITY_PAIRS = 256
 _SAME_ANGLE = 1e-10
 _MOST_ANGLES = 512
+# Relative, and as a share of the median.
+_NOISE = 0.02
+# How often a fit is made again with the noise that follows from it.
+NOISE_ROUNDS = 2
 
 
 def resolve_objective(name: str, has_sigma: bool) -> str:
@@ -91,7 +95,15 @@ def standard_uncertainty(rows: Rows, options: FitOptions) -> np.ndarray:
     value = rows.value if rows.fitted is None else rows.fitted
     magnitude = np.abs(np.where(rows.valid, value, 0.0))
     typical = np.median(np.abs(rows.value[rows.valid]))
-    relative, absolute = options.noise or (0.02, 0.02 * typical)
+    return assumed_noise(magnitude, typical, options.noise)
+
+
+def assumed_noise(
+    magnitude: np.ndarray, typical: ArrayLike, noise: tuple[float, float] | None
+) -> np.ndarray:
+    """Standard uncertainties where values are as large, and ``typical`` is their median."""
+    typical = np.asarray(typical)
+    relative, absolute = noise or (_NOISE, _NOISE * typical)
     # A relative noise alone leaves nothing where the value is 0.
     floor = 1e-6 * typical + 1e-300
     return np.sqrt((relative * magnitude) ** 2 + absolute**2 + floor**2)

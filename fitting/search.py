@@ -13,6 +13,7 @@ from jax.typing import ArrayLike
 
 from fitting import ahead, judge, starts
 from fitting.model import Model
+from fitting.objectives import ROBUST_WIDTH
 from fitting.options import FitOptions
 from fitting.predict import predict_geometry
 from fitting.problem import for_channel, prepare
@@ -21,8 +22,6 @@ from fitting.rows import Rows
 from fitting.solve import Solution, refine
 from fitting.summary import Found, joined_values
 
-_MAD_TO_SIGMA = 1.4826
-_HUBER = 1.345
 # In the unknowns of the solver: a share of 5e-4 of the support is left, and 12 %.
 _FLAT, _INSIDE = 7.6, 2.0
 _PULLS = 4
@@ -123,5 +122,5 @@ def robust_width(
 ) -> float:
     """Width of the pseudo-Huber residual: 1.345 robust standard deviations of a fit's."""
     r = judge.residuals(rows, predicted_by(found, rows), objective, options)[rows.valid]
-    spread = _MAD_TO_SIGMA * float(np.median(np.abs(r - np.median(r))))
-    return _HUBER * spread if spread > 0 else math.inf
+    spread = float(np.median(np.abs(r - np.median(r))))
+    return ROBUST_WIDTH * spread if spread > 0 else math.inf

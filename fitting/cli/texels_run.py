@@ -103,11 +103,14 @@ def settle(file: Path, choices: TexelChoices, who: TexelWork) -> TexelJob:
 
     from fitting.model import Model
     from fitting.texels.fits import lines_per_chunk, texel_options
-    from fitting.texels.task import make_task
+    from fitting.texels.task import make_plan
 
     model = Model(choices.model)
     with jax.enable_x64(True):
-        make_task(source.directions, source.shape[-1], model, texel_options(settings))
+        make_plan(
+            source.directions, source.shape[-1], model, texel_options(settings),
+            with_sigma=source.has_sigma,
+        )  # fmt: skip
     lines = lines_per_chunk(source.shape)
     state = file.stat()
     recipe = {

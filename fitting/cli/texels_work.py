@@ -42,10 +42,10 @@ class FitTexels:
         from fitting.texels.target import flat, write_part
 
         with jax.enable_x64(True):
-            source, task = _common(self.path, self.recipe)
-            found = fit_block(task, *source.read(chunk.first, chunk.last))
+            source, plan = _common(self.path, self.recipe)
+            found = fit_block(plan, *source.read(chunk.first, chunk.last))
             others = ("cost", "converged", "steps", "used", "runner_up")
-            arrays = flat(*named(task, found), {k: found[k] for k in others})
+            arrays = flat(*named(plan, found), {k: found[k] for k in others})
         write_part(self.folder, chunk.first, arrays)
         return found["cost"].shape[0], int(found["converged"].sum())
 
@@ -58,15 +58,16 @@ def settings_of(recipe: str) -> tuple[str, dict[str, Any]]:
 
 @functools.lru_cache(maxsize=1)
 def _common(path: Path, recipe: str):
-    """The file and the task, once per process. Call with x64 enabled."""
+    """The file and the plan, once per process. Call with x64 enabled."""
     from fitting.model import Model
     from fitting.texels.fits import texel_options
     from fitting.texels.source import open_source
-    from fitting.texels.task import make_task
+    from fitting.texels.task import make_plan
 
     model, settings = settings_of(recipe)
     source = open_source(path)
-    task = make_task(
-        source.directions, source.shape[-1], Model(model), texel_options(settings)
-    )
-    return source, task
+    plan = make_plan(
+        source.directions, source.shape[-1], Model(model), texel_options(settings),
+        with_sigma=source.has_sigma,
+    )  # fmt: skip
+    return source, plan

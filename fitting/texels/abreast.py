@@ -12,13 +12,16 @@ from jaxtyping import Array
 
 from fitting import row_sums
 from fitting.compiled import compiled
+from fitting.texels.arrow import penalty_cost, value
 from fitting.texels.descent import State, begin, descend
 from fitting.texels.outcome import Outcome, outcome
 from fitting.texels.scan import Starts, scan
+from fitting.texels.seen import Seen
 from fitting.texels.task import Task
 
 _STARTS = 2
-_LARGEST = 1e100
+# Values beyond this are no values.
+LARGEST = 1e100
 # Where there are wide registers, there are more of them: enough for all the sums of a loop.
 _OPTIONS = {**row_sums.FAST, "xla_cpu_prefer_vector_width": 512}
 
@@ -50,23 +53,27 @@ def lanes() -> Lanes:
 
 
 class Data(NamedTuple):
-    """Of texels: ``values (t, n, c)`` of all rows as in the file, and ``sigma`` if any."""
+    """Of texels: ``values (t, n, c)`` of all rows as in the file, and ``sigma`` if any.
+
+    ``unit, width, scale (t,)`` are those of `Seen`.
+    """
 
     values: np.ndarray
     sigma: np.ndarray | None
+    unit: np.ndarray | None = None
+    width: np.ndarray | None = None
+    scale: np.ndarray | None = None
 
 
 class Texels(NamedTuple):
     """A batch as descents take it, of the rows that count, padded.
 
-    ``heavy`` are weights ``(w, n)`` for all texels or, as are ``values``, so many at a time
-    with the spare ones: ``(blocks, abreast, w, n)`` and ``(blocks, abreast, c, n)``. ``used
-    (t, c)`` tells how many values are known. Texels after the first ``size`` are not
-    looked at.
+    What is ``seen`` has two axes in front, ``(blocks, abreast)``, so many texels at a time
+    with the spare ones; but weights may be ``(w, n)`` for all texels. ``used (t, c)`` tells
+    how many values are known. Texels after the first ``size`` are not looked at.
     """
 
-    heavy: Array
-    values: Array
+    seen: Seen
     used: Array
     size: Array
 
@@ -81,7 +88,7 @@ def arranged(task: Task, data: Data, count: Array, *, own_weights: bool) -> Texe
         return jnp.pad(rows.astype(task.heavy.dtype), padding)
 
     def is_usable(v: Array) -> Array:
-        return jnp.abs(v) < _LARGEST
+        return jnp.abs(v) < LARGEST
 
     values, heavy = rows_last(data.values), task.heavy
     known = is_usable(values)
@@ -91,18 +98,19 @@ def arranged(task: Task, data: Data, count: Array, *, own_weights: bool) -> Texe
         heavy = heavy / jnp.where(known, sigma, 1.0)
     known = known & (task.heavy > 0)
     used = jnp.sum(known, axis=-1, dtype=jnp.int32)
-    if not own_weights:
-        return Texels(heavy, _split(values), used, count)
-    heavy, values = jnp.where(known, heavy, 0.0), jnp.where(known, values, 0.0)
-    return Texels(_split(heavy), _split(values), used, count)
+    if own_weights:
+        heavy = _split(jnp.where(known, heavy, 0.0))
+        values = jnp.where(known, values, 0.0)
+    of_texels = jax.tree.map(_split, (data.unit, data.width, data.scale))
+    return Texels(Seen(heavy, _split(values), *of_texels), used, count)
 
 
 @compiled(_OPTIONS, quickly=False)
 def scanned(task: Task, texels: Texels) -> tuple[Starts, State]:
     """Where they begin, and the states there."""
 
-    def some(heavy: Array, values: Array) -> tuple[Starts, State]:
-        starts = scan(task, heavy, values, _STARTS)
+    def some(seen: Seen) -> tuple[Starts, State]:
+        starts = scan(task, seen, _STARTS)
         return starts, begun(task, starts.u[:, 0], starts.x[:, 0])
 
     return _abreast(some, texels)
@@ -126,31 +134,49 @@ def finished(task: Task, texels: Texels, state: State) -> Outcome:
     return _each(functools.partial(outcome, task), texels, state, texels.used)
 
 
-def _each(function: Any, texels: Texels, *others: Any) -> Any:
-    """``function(heavy, values, *others)`` of every texel."""
+@compiled(_OPTIONS, quickly=False)
+def predicted(task: Task, u: Array, x: Array) -> Array:
+    """The models' values ``(t, n, c)`` at the rows that are used."""
+    values = jax.vmap(functools.partial(value, task))(u, x)
+    return jnp.swapaxes(values[:, :, : task.rows.size], 1, 2)
 
-    def some(heavy: Array, *others: Any) -> Any:
-        if heavy.shape[0] == 1:
-            one = functools.partial(function, heavy[0])
-            return jax.vmap(one)(*others)
-        return jax.vmap(function)(heavy, *others)
+
+@compiled(_OPTIONS, quickly=False)
+def penalties_of(task: Task, scale: Array, u: Array, x: Array) -> Array:
+    """What penalties add to the costs, ``(t,)``."""
+
+    def one(scale: Array, u: Array, x: Array) -> Array:
+        nothing = jnp.zeros((1, 0))
+        return penalty_cost(task, Seen(nothing, nothing, None, None, scale), u, x)
+
+    return jax.vmap(one)(scale, u, x)
+
+
+def _each(function: Any, texels: Texels, *others: Any) -> Any:
+    """``function(seen, *others)`` of every texel."""
+
+    def some(seen: Seen, *others: Any) -> Any:
+        if seen.heavy.shape[0] > 1:
+            return jax.vmap(function)(seen, *others)
+        axes = Seen(None, 0, 0, 0, 0)  # pyright: ignore[reportArgumentType]
+        seen = seen._replace(heavy=seen.heavy[0])
+        return jax.vmap(function, in_axes=(axes, *(0 for _ in others)))(seen, *others)
 
     return _abreast(some, texels, *others)
 
 
 def _abreast(function: Any, texels: Texels, *others: Any) -> Any:
-    """``function(heavy, values, *others)`` of the first texels, for so many at a time.
+    """``function(seen, *others)`` of the first texels, for so many at a time.
 
-    ``heavy`` has a leading 1 where it is that of all.
+    Weights have a leading 1 where they are those of all.
     """
-    arrays = (texels.values, *jax.tree.map(_split, others))
-    shared = texels.heavy.ndim == 2
-    if not shared:
-        arrays = (texels.heavy, *arrays)
+    others = jax.tree.map(_split, others)
+    seen, heavy = texels.seen._replace(heavy=None), texels.seen.heavy  # pyright: ignore
+    shared = heavy.ndim == 2
 
     def part(i: Any) -> Any:
-        here = jax.tree.map(lambda v: v[i], arrays)
-        return function(texels.heavy[None], *here) if shared else function(*here)
+        here, own = jax.tree.map(lambda v: v[i], (seen, others))
+        return function(here._replace(heavy=heavy[None] if shared else heavy[i]), *own)
 
     def add(i: Array, out: Any) -> Any:
         return jax.tree.map(lambda v, new: v.at[i].set(new), out, part(i))

@@ -6,15 +6,19 @@ same operations in the same order whatever its neighbours are.
 
 from __future__ import annotations
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from fitting import penalties
 from fitting.reduced import Blocks, amplitudes
-from fitting.row_sums import dependents
+from fitting.row_sums import Sums, dependents, of_functions
 from fitting.texels import small
 from fitting.texels.box import projected_newton
+from fitting.texels.seen import Seen, misfit, of_channel, own_problem
 from fitting.texels.task import Task
 
 # More operands than these make a loop that the compiler takes long for.
@@ -22,16 +26,18 @@ _MOST_SUMS = 160
 
 
 def evaluate(
-    task: Task,
-    heavy: Float[Array, "w n"],
-    values: Float[Array, "c n"],
-    u: Float[Array, " k"],
-    x: Float[Array, "c m"],
+    task: Task, seen: Seen, u: Float[Array, " k"], x: Float[Array, "c m"]
 ) -> Blocks:
     """The blocks at ``(u, x)``, or at the best ``x`` where that follows from the shape."""
     n_basis, m, k = task.n_basis, x.shape[1], u.shape[0]
     a, to_x, to_u = _amplitudes(task, u, x)
-    gram, gradient, cost = _sums(task, heavy, values, u, a)
+    gram, gradient, cost = _sums(task, seen, u, a)
+    if task.problem.penalised:
+        more = penalty_sums(task, seen, u, jnp.stack(a, axis=-1))
+        every = range(len(gradient))
+        gram = [[gram[i][j] + more.gram[:, i, j] for j in every] for i in every]
+        gradient = [g + more.gradient[:, i] for i, g in enumerate(gradient)]
+        cost = cost + more.cost
     if task.problem.resolves and m:
         among = [row[:n_basis] for row in gram[:n_basis]]
         hessian = small.inner(to_x, small.product(among, to_x))
@@ -56,7 +62,7 @@ def evaluate(
     gram_x = small.product([row[:n_basis] for row in gram[:n_basis]], to_x)
     gram_u = small.product(gram, to_u)
     pull = small.column(gradient)
-    like = x[:, 0] if m else values[:, 0]
+    like = x[:, 0] if m else seen.values[:, 0]
     return Blocks(
         x=x,
         cost=jnp.maximum(cost, 0.0),
@@ -88,25 +94,24 @@ def _amplitudes(
 
 
 def _sums(
-    task: Task, heavy: Array, values: Array, u: Array, a: list[Array]
+    task: Task, seen: Seen, u: Array, a: list[Array]
 ) -> tuple[list[list[Array]], list[Array], Array]:
     """Products ``(1 or c,)`` of weighted features with each other, ``(c,)`` with the
     residual, and the square of that."""
     features = _features(task, u)
-    count, channels = len(features), values.shape[0]
+    count, channels = len(features), seen.values.shape[0]
     upper = [(i, j) for i in range(count) for j in range(i, count)]
-    shared = heavy.shape[0] == 1
-    if len(upper) * heavy.shape[0] + channels * (count + 1) > _MOST_SUMS:
-        gram, gradient, cost = _by_products(features, heavy, values, jnp.stack(a, axis=-1))
+    shared = task.quadratic and seen.heavy.shape[0] == 1
+    if len(upper) * (1 if shared else channels) + channels * (count + 1) > _MOST_SUMS:
+        gram, gradient, cost = _by_products(task, features, seen, jnp.stack(a, axis=-1))
         rows = [[gram[:, i, j] for j in range(count)] for i in range(count)]
         return rows, [*gradient.T], cost
     products: list[list[Array]] = []
     residuals: list[list[Array]] = []
     for c in range(channels):
-        w = heavy[0 if shared else c]
         f = sum(a[j][c] * features[j] for j in range(len(a)))
-        r = w * (jnp.asarray(f) - values[c])
-        some = [w * v for v in features]
+        r, slope = misfit(task, of_channel(seen, c), jnp.asarray(f))
+        some = [slope * v for v in features]
         if c == 0 or not shared:
             products.append([some[i] * some[j] for i, j in upper])
         residuals.append([*(v * r for v in some), r * r])
@@ -163,16 +168,37 @@ def columns(task: Task, u: Array, x: Array) -> list[tuple[Array, list[Array], li
     return out
 
 
+def penalty_sums(task: Task, seen: Seen, u: Array, a: Array) -> Sums:
+    """The same sums over what penalties look at, for amplitudes ``a (c, b)``."""
+    problem = own_problem(task, seen)
+    return functools.reduce(
+        lambda p, q: Sums(*map(jnp.add, p, q)),
+        [of_functions(problem, u, a, *penalty) for penalty in penalties.of(problem)],
+    )
+
+
+def penalty_cost(task: Task, seen: Seen, u: Array, x: Array) -> Array:
+    """What penalties add to the cost."""
+    amplitude, _, _ = _amplitudes(task, u, x)
+    return penalty_sums(task, seen, u, jnp.stack(amplitude, axis=-1)).cost
+
+
+def value(task: Task, u: Array, x: Array) -> Float[Array, "c n"]:
+    """The model's value at all rows, padded."""
+    amplitude, _, _ = _amplitudes(task, u, x)
+    return jnp.stack(amplitude, axis=-1) @ jnp.stack(_features(task, u)[: task.n_basis])
+
+
 def _by_products(
-    features: list[Array], heavy: Array, values: Array, a: Array
+    task: Task, features: list[Array], seen: Seen, a: Array
 ) -> tuple[Array, Array, Array]:
     """The same sums as matrix products, for many features or channels."""
     f = jnp.stack(features)
-    r = heavy * (a @ f[: a.shape[1]] - values)
-    some = heavy[:, None] * f
+    r, slope = misfit(task, seen, a @ f[: a.shape[1]])
+    some = slope[:, None] * f
     gram = jnp.einsum("wfn,wgn->wfg", some, some)
-    each = "cfn" if heavy.shape[0] > 1 else "fn"
-    some = some if heavy.shape[0] > 1 else some[0]
+    each = "cfn" if slope.shape[0] > 1 else "fn"
+    some = some if slope.shape[0] > 1 else some[0]
     return gram, jnp.einsum(f"{each},cn->cf", some, r), jnp.sum(r * r)
 
 

@@ -1,8 +1,9 @@
 """Levenberg-Marquardt for one texel, a few steps at a time, mapped over many.
 
-The step is that of `fitting.solve`, cheaper: coefficients at a bound that their gradient
-pushes against are held there (Bertsekas 1982, SIAM J. Control Optim. 20, 221) instead of a
-quadratic program per proposal.
+The step is that of `fitting.solve`, cheaper: where the coefficients follow from the shape,
+those at a bound that their gradient pushes against are held there (Bertsekas 1982, SIAM J.
+Control Optim. 20, 221) instead of a quadratic program per proposal; else such a program is
+solved by trying which of a few bounds hold.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from jaxtyping import Array, Bool, Float, Int
 from fitting.reduced import Blocks
 from fitting.texels import small
 from fitting.texels.arrow import evaluate
-from fitting.texels.box import held_at
+from fitting.texels.box import best_of_choices, held_at
+from fitting.texels.seen import Seen, size
 from fitting.texels.task import Task
 
 # What a last step, whose end is not looked at again, may leave to be gained, as a share of
@@ -74,17 +76,13 @@ def begin(task: Task, u: Float[Array, " k"], x: Float[Array, "c m"]) -> State:
 
 
 def descend(
-    task: Task,
-    heavy: Float[Array, "w n"],
-    values: Float[Array, "c n"],
-    state: State,
-    until: Int[Array, ""] | np.ndarray,
+    task: Task, seen: Seen, state: State, until: Int[Array, ""] | np.ndarray
 ) -> State:
     """Steps until the texel is finished or has taken ``until`` of them."""
-    scale = jnp.sum((heavy * values) ** 2)
+    scale = size(task, seen)
 
     def step(s: State) -> State:
-        new = evaluate(task, heavy, values, s.next_u, s.next_x)
+        new = evaluate(task, seen, s.next_u, s.next_x)
         first = s.steps == 0
         gained = s.blocks.cost - new.cost
         accept = jnp.isfinite(new.cost) & (first | (gained > 0))
@@ -120,40 +118,101 @@ def propose(
 ) -> tuple[Array, Array, Array, Array]:
     """The next shape and coefficients, and the decrease that the quadratic promises: there,
     and where it is least."""
+    if task.problem.resolves or not task.box.is_small:
+        return _with_held(task, u, b, damping)
+    return _within_box(task, u, b, damping)
+
+
+def _with_held(
+    task: Task, u: Array, b: Blocks, damping: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Coefficients at a bound stay there that their gradient pushes against it."""
     x, k, m = b.x, u.shape[0], b.x.shape[1]
     free, h_xx, h_xu = on_free(task, b)
     pull = [jnp.where(free[:, i], b.g_x[:, i], 0.0) for i in range(m)]
     # Where the coefficients follow exactly, only the shape needs holding back.
     stiffer = 1.0 if task.problem.resolves else 1.0 + damping
-    stiff = [
-        [v * stiffer if i == j else v for j, v in enumerate(row)]
-        for i, row in enumerate(h_xx)
-    ]
-    *responses, along = small.solve(stiff, [*h_xu, pull])
+    *responses, along = small.solve(_stiffened(h_xx, stiffer), [*h_xu, pull])
     promise = jnp.sum(jnp.asarray(small.dot(pull, along)))
     whole = promise * stiffer
     x_step = [-v for v in along]
     if k:
-        schur = [
-            [b.h_uu[p, q] - jnp.sum(jnp.asarray(small.dot(h_xu[p], r)))
-             for q, r in enumerate(responses)]
-            for p in range(k)
-        ]  # fmt: skip
-        gradient = [
-            b.g_u[p] - jnp.sum(jnp.asarray(small.dot(h_xu[p], along))) for p in range(k)
-        ]
-        step, gain = _shape_step(schur, gradient, jnp.diagonal(b.h_uu), damping)
-        whole = whole + gain
-        bent = [
-            2.0 * g + small.dot(row, step) for g, row in zip(gradient, schur, strict=True)
-        ]
-        promise = promise - small.dot(bent, step)
+        step, gain, more = _shape(b, h_xu, responses, x_step, damping)
+        whole, promise = whole + more, promise + gain
         for r, v in zip(responses, step, strict=True):
             x_step = [s - p * v for s, p in zip(x_step, r, strict=True)]
         u = u + jnp.stack(step)
     if m:
         x = jnp.clip(x + jnp.stack(x_step, axis=-1), task.box.low, task.box.high)
     return u, x, jnp.maximum(promise, 0.0), whole
+
+
+def _within_box(
+    task: Task, u: Array, b: Blocks, damping: Array
+) -> tuple[Array, Array, Array, Array]:
+    """The best coefficients within their bounds, before and after the shape moves."""
+    x, k, m = b.x, u.shape[0], b.x.shape[1]
+    h_xx = [[b.h_xx[:, i, j] for j in range(m)] for i in range(m)]
+    h_xu = [[b.h_xu[:, i, p] for i in range(m)] for p in range(k)]
+    own, g_x = [x[:, i] for i in range(m)], [b.g_x[:, i] for i in range(m)]
+    stiff = _stiffened(h_xx, 1.0 + damping)
+    rest = [small.dot(row, own) - g for row, g in zip(stiff, g_x, strict=True)]
+    ends = [task.box.ends(i) for i in range(m)]
+
+    def best(step: small.Vector) -> list[Array]:
+        linear = [
+            v - small.dot([h_xu[p][i] for p in range(k)], step) for i, v in enumerate(rest)
+        ]
+        return best_of_choices(stiff, linear, ends)[0] if m else []
+
+    alone = best([0.0] * k)
+    low, high = task.box.low, task.box.high
+    held = [(v <= low[:, i]) | (v >= high[:, i]) for i, v in enumerate(alone)]
+    x_step = [v - w for v, w in zip(alone, own, strict=True)]
+    bent = [2.0 * g + small.dot(row, x_step) for g, row in zip(g_x, h_xx, strict=True)]
+    promise = jnp.maximum(-jnp.sum(jnp.asarray(small.dot(bent, x_step))), 0.0)
+    whole = promise * (1.0 + damping)
+    if k:
+        masked = [
+            [jnp.where(held[i] | held[j], float(i == j), v) for j, v in enumerate(row)]
+            for i, row in enumerate(stiff)
+        ]
+        free_xu = [
+            [jnp.where(h, 0.0, v) for h, v in zip(held, r, strict=True)] for r in h_xu
+        ]
+        responses = small.solve(masked, free_xu)
+        step, gain, more = _shape(b, h_xu, responses, x_step, damping)
+        whole, promise = whole + more, promise + jnp.maximum(gain, 0.0)
+        u, alone = u + jnp.stack(step), best(step)
+    return u, jnp.stack(alone, axis=-1) if m else x, promise, whole
+
+
+def _stiffened(matrix: small.Matrix, factor: Array | float) -> list[list[Array]]:
+    return [
+        [v * factor if i == j else v for j, v in enumerate(row)]
+        for i, row in enumerate(matrix)
+    ]
+
+
+def _shape(
+    b: Blocks,
+    h_xu: small.Matrix,
+    responses: small.Matrix,
+    x_step: small.Vector,
+    damping: Array,
+) -> tuple[list[Array], Array, Array]:
+    """The step of the shape after one of the coefficients, which respond to it; what it
+    gains, and what would be gained without damping."""
+    every = range(len(h_xu))
+    schur = [
+        [b.h_uu[p, q] - jnp.sum(jnp.asarray(small.dot(h_xu[p], responses[q])))
+         for q in every]
+        for p in every
+    ]  # fmt: skip
+    gradient = [b.g_u[p] + jnp.sum(jnp.asarray(small.dot(h_xu[p], x_step))) for p in every]
+    step, most = _shape_step(schur, gradient, jnp.diagonal(b.h_uu), damping)
+    bent = [2.0 * g + small.dot(row, step) for g, row in zip(gradient, schur, strict=True)]
+    return step, -jnp.asarray(small.dot(bent, step)), most
 
 
 def _shape_step(

@@ -15,9 +15,10 @@ from data_formats import MeasurementError
 from fitting.expression import ModelError
 from fitting.model import Model
 from fitting.options import FitOptions
+from fitting.problem import resolve_objective
 from fitting.texels.abreast import lanes
-from fitting.texels.many import fit_chunk
-from fitting.texels.task import Task, make_task
+from fitting.texels.rounds import fit_chunk
+from fitting.texels.task import Plan, make_plan
 
 # Of measured values in one chunk, and the most texels: what is in memory at a time.
 _CHUNK_BYTES = 48_000_000
@@ -29,7 +30,8 @@ OBJECTIVE = "l2cos"
 class TexelFits:
     """Fits of texels, arrays of their leading shape ``(t,)`` or ``(h, w)``.
 
-    - ``parameters``: by name, shape parameters ``(t,)`` and coefficients ``(t, c)``.
+    - ``parameters``: by name, shape parameters ``(t,)`` and coefficients ``(t, c)``; all
+      ``(t, c)`` where each channel has its own shape.
     - ``uncertainties``: the same, standard (k = 1), those of `fitting.uncertainty`; NaN
       for what is fixed or held by a bound.
     - ``cost``: the sum of squares that was made small.
@@ -75,8 +77,9 @@ def fit_many(
     set of HDF5 that is read in chunks; what is NaN, or where ``valid`` of the same shape is
     false, is left out. ``directions`` are ``theta_i, phi_i, theta_r, phi_r (n,)`` in rad.
     ``sigma``, standard uncertainties for ``chi2``, has the shape of the values.
-    ``settings`` are fields of `FitOptions`; the objective is ``l2cos``, ``l2`` or ``chi2``,
-    and there is no penalty on the albedo. ``progress`` is called with texels done.
+    ``settings`` are fields of `FitOptions`, whose defaults here are the quickest: the
+    objective ``l2cos``, in which the residual is linear in the model's value, and no
+    penalties. Others take several times as long. ``progress`` is called with texels done.
     ``single_first``: float32 as far as it goes and then float64, for GPUs that are slow at
     the latter.
 
@@ -91,7 +94,10 @@ def fit_many(
     angles = tuple(np.asarray(a, dtype=np.float64) for a in directions)
     parts: list[dict[str, np.ndarray]] = []
     with jax.enable_x64(True):
-        task = make_task(angles, channels, model, options)  # pyright: ignore[reportArgumentType]
+        plan = make_plan(
+            angles,  # pyright: ignore[reportArgumentType]
+            channels, model, options, with_sigma=sigma is not None,
+        )  # fmt: skip
         lines = lines_per_chunk(values.shape)
         for first in range(0, leading[0], lines):
             here = slice(first, first + lines)
@@ -99,11 +105,11 @@ def fit_many(
                 None if v is None else np.asarray(v[here]).reshape(-1, n, channels)
                 for v in (values, sigma, valid)
             ]
-            parts.append(fit_block(task, *block, single_first=single_first))  # pyright: ignore
+            parts.append(fit_block(plan, *block, single_first=single_first))  # pyright: ignore
             if progress is not None:
                 progress(min(first + lines, leading[0]) * math.prod(leading[1:]))
     whole = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
-    return _named(task, whole, leading)
+    return _named(plan, whole, leading)
 
 
 def lines_per_chunk(shape: tuple[int, ...]) -> int:
@@ -116,7 +122,7 @@ def lines_per_chunk(shape: tuple[int, ...]) -> int:
 
 
 def fit_block(
-    task: Task,
+    plan: Plan,
     values: np.ndarray,
     sigma: np.ndarray | None,
     valid: np.ndarray | None,
@@ -126,14 +132,15 @@ def fit_block(
     """`fit_chunk` of values ``(t, n, c)`` that count where ``valid`` is not 0."""
     if valid is not None:
         values = np.where(valid != 0, values, np.nan)
-    return fit_chunk(task, values, sigma, single_first=single_first)
+    return fit_chunk(plan, values, sigma, single_first=single_first)
 
 
 def named(
-    task: Task, found: Mapping[str, np.ndarray]
+    plan: Plan, found: Mapping[str, np.ndarray]
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Parameters and uncertainties by name, in the model's order."""
-    unknowns = task.problem.unknowns
+    problem = plan.tasks[0].problem
+    unknowns = problem.unknowns
     parameters: dict[str, np.ndarray] = {}
     uncertainties: dict[str, np.ndarray] = {}
     for kind, names in (
@@ -144,15 +151,15 @@ def named(
         for i, name in enumerate(names):
             parameters[name] = found[plural][:, i]
             uncertainties[name] = found[f"{kind}_uncertainty"][:, i]
-    order = task.problem.model.parameters()
+    order = problem.model.parameters()
     return {n: parameters[n] for n in order}, {n: uncertainties[n] for n in order}
 
 
-def _named(task: Task, found: dict[str, np.ndarray], leading: tuple[int, ...]) -> TexelFits:
+def _named(plan: Plan, found: dict[str, np.ndarray], leading: tuple[int, ...]) -> TexelFits:
     def shaped(v: np.ndarray) -> np.ndarray:
         return v.reshape(*leading, *v.shape[1:])
 
-    parameters, uncertainties = named(task, found)
+    parameters, uncertainties = named(plan, found)
     plain = ("cost", "converged", "steps", "used", "runner_up")
     return TexelFits(
         {k: shaped(v) for k, v in parameters.items()},
@@ -185,5 +192,9 @@ def _check(
                 f"{name} has the shape {tuple(other.shape)}; expected that of the values, "
                 f"{shape}"
             )
-    if (options.objective == "chi2") != (sigma is not None):
-        raise ModelError("the objective chi2 and sigma go together: give both or neither")
+    chi2 = resolve_objective(options.objective, sigma is not None) == "chi2"
+    if chi2 != (sigma is not None or options.noise is not None):
+        raise ModelError(
+            "the objective chi2 and standard uncertainties (sigma or noise) go together: "
+            "give both or neither"
+        )

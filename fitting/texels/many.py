@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
 
+from fitting.texels import abreast
 from fitting.texels.abreast import (
     Data,
     Texels,
@@ -39,59 +39,93 @@ _SAME_MINIMUM = 1e-6
 _FLAT, _INSIDE = 7.6, 2.0
 
 
-def fit_chunk(
-    task: Task,
-    values: np.ndarray,
-    sigma: np.ndarray | None = None,
-    *,
-    single_first: bool = False,
-) -> dict[str, np.ndarray]:
-    """The fields of `Outcome`, and ``runner_up (t,)``, of texels.
+class Found(NamedTuple):
+    """Of texels: what is known at the end, and the one or two ``ends`` of descents, the
+    better one first."""
 
-    ``values (t, n, c)`` have all rows of the file, NaN where unknown; so has ``sigma``.
+    outcome: Outcome
+    ends: Starts
+
+    @property
+    def runner_up(self) -> np.ndarray:
+        """Cost of another minimum over that of the best, NaN if there is none."""
+        low, high = np.asarray(self.ends.cost).T
+        apart = np.isfinite(high) & (high > low * (1.0 + _SAME_MINIMUM)) & (low > 0)
+        return np.where(apart, high, np.nan) / np.where(apart, low, 1.0)
+
+
+def first(task: Task, data: Data, *, single_first: bool = False) -> Found:
+    """From the scan to the ends.
+
+    ``data.values (t, n, c)`` have all rows of the file, NaN where unknown.
     ``single_first``: descend in float32 and then on in float64, for GPUs that are slow at
     the latter. Call with x64 enabled.
     """
-    data = Data(values, sigma)
-    out, complete = _fit(task, data, own_weights=sigma is not None, single=single_first)
-    other = np.flatnonzero(~complete)
-    if other.size and sigma is None:
-        some = _taken(data, other)
-        found, _ = _fit(task, some, own_weights=True, single=single_first)
-        for name, v in found.items():
-            out[name][other] = v
-    return out
+    own_weights = data.sigma is not None
+    found = _first(task, data, own_weights=own_weights, single=single_first)
+    other = np.flatnonzero(~_complete(task, found))
+    if other.size and not own_weights:
+        some = _first(task, _taken(data, other), own_weights=True, single=single_first)
+        _replace(found, other, some)
+    return found
 
 
-def _fit(
-    task: Task, data: Data, *, own_weights: bool, single: bool
-) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Of texels whose weights are their own, or those of all; and which are complete, as
-    the latter have to be."""
-    few = np.asarray(_FIRST_STEPS if task.even else _FEW_STEPS)
+def again(task: Task, data: Data, found: Found, which: np.ndarray) -> None:
+    """Refit some texels with other residuals from all ends: their order may change."""
+    complete = _complete(task, found)[which] & (data.sigma is None)
+    for own_weights, index in ((False, which[complete]), (True, which[~complete])):
+        if not index.size:
+            continue
+        rest = _Rest(task, _taken(data, index), own_weights)
+        ends = _taken(found.ends, index)
+        state = rest.refined(_begun(task, ends.u[:, 0], ends.x[:, 0]))
+        ends = rest.best_of_two(state, ends, np.isfinite(ends.cost[:, 1]))
+        _replace(found, index, Found(rest.finished(state), ends))
 
-    def first(count: Any, some: Data) -> tuple[Outcome, State, Starts, Array]:
+
+def predicted(task: Task, found: Found) -> np.ndarray:
+    """The models' values ``(t, n, c)`` at the rows that are used."""
+    u, x = found.ends.u[:, 0], found.ends.x[:, 0]
+    return _in_batches(lambda _, *some: abreast.predicted(task, *some), u, x)
+
+
+def penalties_of(task: Task, data: Data, found: Found) -> np.ndarray:
+    """What penalties would add to the costs, ``(t,)``."""
+    at = data.scale, found.ends.u[:, 0], found.ends.x[:, 0]
+    return _in_batches(lambda _, *some: abreast.penalties_of(task, *some), *at)
+
+
+def _complete(task: Task, found: Found) -> np.ndarray:
+    """Texels of which every value is known."""
+    channels = task.channels
+    return found.outcome.used == np.sum(np.broadcast_to(task.used, channels))
+
+
+def _first(task: Task, data: Data, *, own_weights: bool, single: bool) -> Found:
+    """Of texels whose weights are their own, or those of all, which have to be complete."""
+    few = np.asarray(_FIRST_STEPS if task.even and task.quadratic else _FEW_STEPS)
+
+    def begin(count: Any, some: Data) -> tuple[Outcome, State, Starts]:
         texels = arranged(task, some, count, own_weights=own_weights)
         starts, state = scanned(task, texels)
         if single:
             state = _roughly(task, texels, state, few)
         state = gone_on(task, texels, state, few)
-        return finished(task, texels, state), state, starts, texels.used
+        return finished(task, texels, state), state, starts
 
-    outcome, state, starts, used = _in_batches(first, data)
+    outcome, state, starts = _in_batches(begin, data)
     state.done[:] &= outcome.as_promised
-    complete = np.all(used == np.asarray(task.used), axis=-1)
-    ratio = np.full(complete.size, np.nan)
     # A second start is refined only where it may lead to something better.
     second = starts.cost[:, 1] < _FAR_COSTLIER * starts.cost[:, 0]
     left = ~state.done | second | _flat(task, state).any(axis=1)
-    rest = np.flatnonzero(left if own_weights else left & complete)
+    found = Found(outcome, _ends(state))
+    rest = np.flatnonzero(left if own_weights else left & _complete(task, found))
     if rest.size:
         some = _Rest(task, _taken(data, rest), own_weights)
         new = some.refined(_taken(state, rest))
-        ratio[rest] = some.best_of_two(new, _taken(starts, rest), second[rest])
-        _replace(outcome, rest, some.finished(new))
-    return {**outcome._asdict(), "runner_up": ratio}, complete
+        ends = some.best_of_two(new, _taken(starts, rest), second[rest])
+        _replace(found, rest, Found(some.finished(new), ends))
+    return found
 
 
 class _Rest(NamedTuple):
@@ -106,30 +140,31 @@ class _Rest(NamedTuple):
         of its support's map."""
         state = self._descended(state)
         flat = _flat(self.task, state)
-        again = np.flatnonzero(flat.any(axis=1))
-        if again.size:
-            u = np.where(flat, np.sign(state.u) * _INSIDE, state.u)[again]
-            some = self._replace(data=_taken(self.data, again))
-            new = some._descended(_begun(self.task, u, state.blocks.x[again]))
-            _replace(state, again, new, new.blocks.cost < state.blocks.cost[again])
+        stuck = np.flatnonzero(flat.any(axis=1))
+        if stuck.size:
+            u = np.where(flat, np.sign(state.u) * _INSIDE, state.u)[stuck]
+            some = self._replace(data=_taken(self.data, stuck))
+            new = some._descended(_begun(self.task, u, state.blocks.x[stuck]))
+            _replace(state, stuck, new, new.blocks.cost < state.blocks.cost[stuck])
         return state
 
-    def best_of_two(self, state: State, starts: Starts, where: np.ndarray) -> np.ndarray:
-        """Put the ends from second starts in where they are better; gives the costs of
-        what was found besides, over those of the best."""
-        ratio = np.full(where.size, np.nan)
+    def best_of_two(self, state: State, starts: Starts, where: np.ndarray) -> Starts:
+        """Put the ends from second starts in where they are better; gives both ends."""
         index = np.flatnonzero(where)
+        ends = _ends(state)
         if index.size:
             some = self._replace(data=_taken(self.data, index))
-            u, x = starts.u[index, 1], starts.x[index, 1]
-            other = some.refined(_begun(self.task, u, x))
+            other = some.refined(_begun(self.task, starts.u[index, 1], starts.x[index, 1]))
             costs = np.stack([state.blocks.cost[index], other.blocks.cost])
             costs = np.where(np.isfinite(costs), costs, np.inf)
-            _replace(state, index, other, costs[1] < costs[0])
-            low, high = costs.min(axis=0), costs.max(axis=0)
-            apart = np.isfinite(high) & (high > low * (1.0 + _SAME_MINIMUM)) & (low > 0)
-            ratio[index[apart]] = high[apart] / low[apart]
-        return ratio
+            better = costs[1] < costs[0]
+            two = [_taken(ends, index), _ends(other)]
+            for both, mine, theirs in zip(ends, *two, strict=True):
+                wide = better.reshape(-1, *(1,) * (both.ndim - 2))
+                both[index, 0] = np.where(wide, theirs[:, 0], mine[:, 0])
+                both[index, 1] = np.where(wide, mine[:, 0], theirs[:, 0])
+            _replace(state, index, other, better)
+        return ends
 
     def finished(self, state: State) -> Outcome:
         """What is known of them at the end."""
@@ -155,6 +190,14 @@ class _Rest(NamedTuple):
             _replace(state, waiting, new)
             waiting = waiting[~new.done]
         return state
+
+
+def _ends(state: State) -> Starts:
+    """Ends with room for a second one, whose cost is infinite."""
+    cost = np.where(np.isfinite(state.blocks.cost), state.blocks.cost, np.inf)
+    none = np.full_like(cost, np.inf)
+    u, x = (np.stack([v, v], axis=1) for v in (state.next_u, state.next_x))
+    return Starts(u, np.stack([cost, none], axis=1), x)  # pyright: ignore
 
 
 def _flat(task: Task, state: State) -> np.ndarray:

@@ -8,7 +8,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from fitting.texels.arrow import evaluate, penalty_cost
 from fitting.texels.descent import State
+from fitting.texels.seen import Seen
 from fitting.texels.spread import Spread, spread
 from fitting.texels.task import Task
 
@@ -36,24 +38,18 @@ class Outcome(NamedTuple):
     as_promised: Bool[Array, ""]
 
 
-def outcome(
-    task: Task,
-    heavy: Float[Array, "w n"],
-    values: Float[Array, "c n"],
-    state: State,
-    used: Int[Array, " c"],
-) -> Outcome:
+def outcome(task: Task, seen: Seen, state: State, used: Int[Array, " c"]) -> Outcome:
     """The outcome of a descent, of a texel with so many known values per channel."""
     unknowns, b = task.problem.unknowns, state.blocks
     k, m = state.u.shape[0], b.x.shape[1]
     number = jnp.sum(used)
     # As many values as coefficients in every channel, and as unknowns in all.
-    known = spread(task, heavy, values, state, state.next_u, state.next_x)
-    better = known.cost <= b.cost
+    known, last = _at_the_end(task, seen, state)
+    better = last <= b.cost
     u = jnp.where(better, state.next_u, state.u)
     x = jnp.where(better, state.next_x, b.x)
-    cost = jnp.where(better, known.cost, b.cost)
-    surprise = jnp.abs(b.cost - known.cost - state.predicted)
+    cost = jnp.where(better, last, b.cost)
+    surprise = jnp.abs(b.cost - last - state.predicted)
     as_promised = surprise <= _SURPRISING * state.predicted + _ROUNDING * b.cost
     enough = jnp.all(used >= m) & (number >= m * used.size + k) & jnp.isfinite(cost)
 
@@ -77,6 +73,22 @@ def outcome(
         used=number,
         as_promised=as_promised,
     )
+
+
+def _at_the_end(task: Task, seen: Seen, state: State) -> tuple[Spread, Array]:
+    """What is known after the last step, and the cost there.
+
+    Penalties move the minimum but are no data: the information is that of the data alone.
+    """
+    u, x = state.next_u, state.next_x
+    if not task.problem.penalised:
+        known = spread(task, seen, state.blocks, u, x)
+        return known, known.cost
+    nothing = seen._replace(scale=jnp.zeros_like(state.damping))
+    blocks = evaluate(task, nothing, u, x)
+    # Which coefficients are held at a bound is decided with the penalties.
+    known = spread(task, seen, blocks._replace(g_x=state.blocks.g_x), u, x)
+    return known, known.cost + penalty_cost(task, seen, u, x)
 
 
 def _of_shapes(task: Task, u: Array, known: Spread) -> list[Array]:

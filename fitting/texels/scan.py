@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 
 from fitting.texels import between
 from fitting.texels.quadratics import at_candidates, minimised
+from fitting.texels.seen import Seen, linear_weights
 from fitting.texels.task import Task
 
 # In the scale of unknowns: candidates as close as this lead to the same minimum.
@@ -27,17 +28,16 @@ class Starts(NamedTuple):
     x: Float[Array, "t s c m"]
 
 
-def scan(
-    task: Task, heavy: Float[Array, "t w n"], values: Float[Array, "t c n"], count: int
-) -> Starts:
-    """The ``count`` best candidates that are far from each other, for texels.
+def scan(task: Task, seen: Seen, count: int) -> Starts:
+    """The ``count`` best candidates that are far from each other, for texels ``(t, ...)``.
 
-    ``heavy`` has a leading 1 where all texels have the same weights. A cost is infinite
-    where there is no further candidate.
+    The residual is linearised at the data. Weights have a leading 1 where they are those of
+    all. A cost is infinite where there is no further candidate.
     """
-    exact = values.dtype
+    exact = seen.values.dtype
     # Half the precision and time: what is found here is only where to begin.
-    task, heavy, values = jax.tree.map(_single, (task, heavy, values))
+    task, seen = jax.tree.map(_single, (task, seen))
+    heavy, values = linear_weights(task, seen), seen.values
     quadratics = at_candidates(task, heavy, values)
     every = between.EVERY if task.even else 1
     points, shape = task.points[::every], (values.shape[1], values.shape[0])

@@ -12,9 +12,11 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from fitting.reduced import Blocks
 from fitting.texels import small
 from fitting.texels.arrow import add_up, columns
-from fitting.texels.descent import State, on_free
+from fitting.texels.descent import on_free
+from fitting.texels.seen import Seen, misfit, of_channel
 from fitting.texels.task import Task
 
 # A row that determines an unknown all by itself says nothing about its error.
@@ -23,7 +25,7 @@ _LEAST_FREEDOM = 1e-3
 
 class Spread(NamedTuple):
     """Standard uncertainties of the unknowns, NaN of a coefficient that a bound holds; and
-    the cost at ``(u, x)``."""
+    the data's cost at ``(u, x)``."""
 
     u: Float[Array, " k"]
     x: Float[Array, "c m"]
@@ -31,17 +33,11 @@ class Spread(NamedTuple):
 
 
 def spread(
-    task: Task,
-    heavy: Float[Array, "w n"],
-    values: Float[Array, "c n"],
-    state: State,
-    u: Float[Array, " k"],
-    x: Float[Array, "c m"],
+    task: Task, seen: Seen, b: Blocks, u: Float[Array, " k"], x: Float[Array, "c m"]
 ) -> Spread:
-    """The square roots of the sandwich's diagonal at ``(u, x)``, where the state's blocks
-    still hold."""
-    b = state.blocks
-    (channels, m), k = b.x.shape, state.u.shape[0]
+    """The square roots of the sandwich's diagonal at ``(u, x)``, where blocks still hold
+    that are those of the data alone."""
+    (channels, m), k = b.x.shape, u.shape[0]
     free, h_xx, h_xu = on_free(task, b)
     units = [[jnp.full(channels, float(i == j)) for i in range(m)] for j in range(m)]
     solved = small.solve(h_xx, [*h_xu, *units])
@@ -56,7 +52,7 @@ def spread(
 
     pulls, own, squares = [], [], []
     for c, (value, in_x, in_u) in enumerate(columns(task, u, x)):
-        w = heavy[min(c, heavy.shape[0] - 1)]
+        misfitted, w = misfit(task, of_channel(seen, c), value)
         in_x = [jnp.where(free[c, i], w * v, 0.0) for i, v in enumerate(in_x)]
         # What a row tells of the shape when the coefficients have followed.
         alone = [
@@ -67,9 +63,8 @@ def spread(
         leverage = small.dot(in_x, ahead)
         leverage = leverage + small.dot(alone, [small.dot(r, alone) for r in of_u])
         rest = jnp.maximum(1.0 - leverage, _LEAST_FREEDOM)
-        plain = w * (value - values[c])
-        r = plain / jnp.sqrt(rest)
-        squares.append(plain * plain)
+        r = misfitted / jnp.sqrt(rest)
+        squares.append(misfitted * misfitted)
         pulls.append([v * r for v in alone])
         own.append([v * r for v in ahead])
     moved = [small.dot(row, [sum(p[q] for p in pulls) for q in range(k)]) for row in of_u]

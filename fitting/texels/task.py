@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import dataclass
 
 import equinox as eqx
 import jax
@@ -17,7 +18,7 @@ from fitting.model import Model
 from fitting.objectives import OBJECTIVES
 from fitting.options import FitOptions
 from fitting.reduced import Problem, amplitudes
-from fitting.rows import select_rows
+from fitting.rows import Rows, select_rows, weighted
 from fitting.starts import candidates
 from fitting.texels.box import Box, make_box
 
@@ -25,15 +26,15 @@ from fitting.texels.box import Box, make_box
 _ROWS_AT_ONCE = 8
 # Candidates of one shape unknown, close enough for polynomials between them.
 _EVEN = 49
-_OFF = {"robust": False, "per_channel_shape": False, "energy": 0, "reciprocity": 0}
-_LINEAR = tuple(name for name, o in OBJECTIVES.items() if o.linear)
 
 
 class Task(eqx.Module):
     """Arrays that all texels share, of the rows that are used (``n``, padded).
 
     ``problem`` is that of a texel, whose values are not looked at. A residual is ``heavy
-    (f - y)``, ``heavy (1 or c, n)`` in the fit's own weights. ``points (p, k)`` are shapes
+    (f - y)``, ``heavy (1 or c, n)`` in the fit's own weights, where the cost is `quadratic`
+    in the model's value; else these weights are without ``kappa`` (`fitting.objectives`).
+    Penalties have their weights for a texel whose scale is 1. ``points (p, k)`` are shapes
     to begin from, ``even``ly apart if that is one unknown. At these
     the model is ``offset + columns x``, linearised at ``x = 0``: ``columns (d, m, p, n)``
     and ``offset (d, p, n)`` for all channels alike (d = 1) or not; ``moving`` tells which
@@ -56,6 +57,11 @@ class Task(eqx.Module):
     rows: np.ndarray
 
     @property
+    def quadratic(self) -> bool:
+        """Whether the residual is linear in the model's value."""
+        return _is_quadratic(self.problem)
+
+    @property
     def used(self) -> Array:
         """How many rows count, ``(1 or c,)``."""
         return jnp.sum(self.heavy > 0, axis=-1)
@@ -66,47 +72,87 @@ class Task(eqx.Module):
         return self.box.low.shape[0]
 
 
+@dataclass(frozen=True)
+class Plan:
+    """The tasks of texels, one per channel where each has its own shape, and the options,
+    whose objective is settled."""
+
+    tasks: list[Task]
+    options: FitOptions
+
+    @property
+    def takes_sigma(self) -> bool:
+        """Whether standard uncertainties of the data count."""
+        return OBJECTIVES[self.options.objective].uses_sigma and self.options.noise is None
+
+    @property
+    def assumes_noise(self) -> bool:
+        """Whether standard uncertainties are assumed."""
+        return self.options.noise is not None
+
+    @property
+    def may_be_penalised(self) -> bool:
+        """Whether there are penalties on what the model can break."""
+        reciprocal = self.tasks[0].problem.model.reciprocal
+        one_sided = not reciprocal and self.options.reciprocity > 0
+        return float(self.options.energy) > 0 or one_sided
+
+
 def check_options(options: FitOptions) -> None:
     """Raises `ModelError` for what is not done for texels."""
-    if options.objective not in _LINEAR:
-        raise ModelError(
-            f"texels are fitted with one of the objectives {', '.join(_LINEAR)}, in which "
-            f"the residual is linear in the model's value; found {options.objective!r}"
-        )
-    for name, off in _OFF.items():
-        if getattr(options, name) != off:
-            raise ModelError(
-                f"texels are fitted without {name}; found {getattr(options, name)!r}"
-            )
-    if options.objective == "chi2" and options.noise is not None:
-        raise ModelError("texels take chi2 with standard uncertainties, not with noise")
+    if options.energy == "hard":
+        raise ModelError("texels are fitted with a number as weight energy; found 'hard'")
     if options.material:
         raise ModelError("texels take no material; fix the lobe's parameters instead")
-    if isinstance(options.weights, np.ndarray):
-        raise ModelError("texels take the weights 'solid-angle' or 'rows'")
+    if options.noise is not None and options.objective != "chi2":
+        raise ModelError(
+            f"texels take noise with the objective chi2; found {options.objective!r}"
+        )
 
 
-def make_task(
+def make_plan(
     angles: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     channels: int,
     model: Model,
     options: FitOptions,
-) -> Task:
-    """The task for directions ``theta_i, phi_i, theta_r, phi_r`` (each ``(n,)``, rad).
+    *,
+    with_sigma: bool,
+) -> Plan:
+    """The plan for directions ``theta_i, phi_i, theta_r, phi_r`` (each ``(n,)``, rad).
 
     Raises `ModelError` for options that are not for texels and `MeasurementError` if no
     row is left. Call with x64 enabled.
     """
     check_options(options)
-    measurement = _stand_in(angles, channels, with_sigma=options.objective == "chi2")
+    measurement = _stand_in(angles, channels)
     rows = select_rows(measurement, options.max_theta_deg, model.ways)
-    problem = problems.prepare(rows, model, options)
+    if isinstance(options.weights, np.ndarray):
+        rows = weighted(rows, options.weights)
+    objective = problems.resolve_objective(options.objective, with_sigma)
+    options = dataclasses.replace(options, objective=objective)
+    # Each texel has standard uncertainties of its own.
+    problem = problems.prepare(rows, model, dataclasses.replace(options, noise=None))
+    n = rows.index.size
+    problem = _first_rows(problem, -(-n // _ROWS_AT_ONCE) * _ROWS_AT_ONCE)
+    problem = dataclasses.replace(
+        problem,
+        energy_weight=jnp.asarray(float(options.energy) / channels),
+        reciprocity_weight=jnp.asarray(float(options.reciprocity) / channels),
+    )
+    if OBJECTIVES[objective].scaled:
+        # Each texel has its own unit.
+        problem = dataclasses.replace(problem, kappa=jnp.abs(problem.geometry.cos_o))
+    if options.per_channel_shape:
+        each = [problems.for_channel(problem, c) for c in range(channels)]
+        return Plan([_task(p, rows) for p in each], options)
     if problem.unknowns.spectral:
         raise ModelError(
             "texels take one value for all channels of a shape parameter that is fixed"
         )
-    n = rows.index.size
-    problem = _first_rows(problem, -(-n // _ROWS_AT_ONCE) * _ROWS_AT_ONCE)
+    return Plan([_task(problem, rows)], options)
+
+
+def _task(problem: Problem, rows: Rows) -> Task:
     points = candidates(problem)
     even = points.shape[1] == 1
     if even:
@@ -118,7 +164,7 @@ def make_task(
     return Task(
         problem=problem,
         box=make_box(problem.unknowns),
-        heavy=problem.weight * problem.kappa,
+        heavy=_heavy(problem),
         points=jnp.asarray(points),
         columns=columns,
         offset=offset,
@@ -132,7 +178,21 @@ def make_task(
     )
 
 
-def _stand_in(angles, channels: int, *, with_sigma: bool) -> Measurement:
+def with_residuals(task: Task, *, robust: bool, penalised: bool) -> Task:
+    """The same task with other residuals."""
+    problem = dataclasses.replace(task.problem, robust=robust, penalised=penalised)
+    return dataclasses.replace(task, problem=problem, heavy=_heavy(problem))
+
+
+def _is_quadratic(problem: Problem) -> bool:
+    return OBJECTIVES[problem.objective].linear and not problem.robust
+
+
+def _heavy(problem: Problem) -> Array:
+    return problem.weight * problem.kappa if _is_quadratic(problem) else problem.weight
+
+
+def _stand_in(angles, channels: int) -> Measurement:
     """A measurement in these directions: what rows, weights and unknowns are made from."""
     value = np.ones((np.size(angles[0]), channels))
     return Measurement(
@@ -140,7 +200,7 @@ def _stand_in(angles, channels: int, *, with_sigma: bool) -> Measurement:
         value=value,
         valid=np.ones(value.shape, dtype=bool),
         channels=tuple(Channel(f"{k}") for k in range(channels)),
-        sigma=value if with_sigma else None,
+        sigma=value,
     )
 
 
