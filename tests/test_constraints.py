@@ -3,59 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
-import types
-from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import skewed_lobe
 import synthetic
 
 from data_formats import Channel
 from fitting import ModelError, colour, diagnostics, fit, objectives
 from fitting.albedo import model_albedo
 from fitting.model import Model
-from fitting.models import LOBES, Lobe
-from fitting.parameters import coefficient, shape
 from fitting.rows import select_rows
 from fitting.solid_angle import incidence_labels, solid_angle_weights, solid_angles
 
 
-class Skewed(Lobe):
-    """``albedo/pi (1 + skew (cos_i - cos_o))``: violates reciprocity by its skew."""
-
-    NAME: ClassVar[str] = "skewed"
-    REFERENCE: ClassVar[str] = "made for a test"
-    RECIPROCAL: ClassVar[bool] = False
-    LINEAR: ClassVar[bool] = True
-    ALBEDO_BOUND: ClassVar[float | None] = None
-
-    def parameters(self):
-        return (
-            shape("skew", 0.1, (0.0, 0.9), "asymmetry", scale="linear", start=(0.05, 0.8)),
-            coefficient("albedo", 0.5, "albedo"),
-        )
-
-    def basis(self, shape, geometry):
-        g = geometry
-        value = (1.0 + shape["skew"] * (g.cos_i - g.cos_o)) / jnp.pi
-        return (jnp.where(g.reflects, value, 0.0),)
-
-    def amplitudes(self, shape, coefficients):
-        return coefficients
-
-    def peak(self, shape):
-        return None
-
-
 @pytest.fixture
 def skewed(monkeypatch):
-    module = types.ModuleType("fitting.models.skewed")
-    module.Skewed = Skewed
-    monkeypatch.setitem(sys.modules, "fitting.models.skewed", module)
-    monkeypatch.setitem(LOBES, "skewed", "Skewed")
+    skewed_lobe.install(monkeypatch)
 
 
 def test_the_penalty_pulls_a_lobe_that_is_not_reciprocal(skewed):

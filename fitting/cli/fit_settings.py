@@ -93,7 +93,7 @@ def _job(said: Mapping[str, Any]) -> Job:
         elif key == "weights":
             options[key] = _one_of(key, value, get_args(WeightsChoice))
         elif key == "noise":
-            options[key] = _noise(value)
+            options[key] = noise_of(value)
         elif key == "energy":
             options[key] = "hard" if value == "hard" else _number(key, value)
         elif key == "starts":
@@ -146,7 +146,7 @@ def _one_of(key: str, value: Any, known: tuple[str, ...]) -> str:
     return value
 
 
-def _noise(value: Any) -> tuple[float, float]:
+def noise_of(value: Any) -> tuple[float, float]:
     parts = value.split(",") if isinstance(value, str) else value
     numbers = [assignments.number(p) for p in parts] if isinstance(parts, list) else []
     if len(numbers) != 2 or not all(math.isfinite(x) and x >= 0 for x in numbers):

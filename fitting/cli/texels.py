@@ -5,26 +5,28 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Group, Parameter
 
 from fitting.cli import failures
+from fitting.cli.fit_choices import ObjectiveChoice, WeightsChoice
 from fitting.cli.flags import WORK, Flags, Scheduler
 
 _MODEL = Group("Model", sort_key=1)
 _MADE_SMALL = Group("What is made small", sort_key=2)
+_PHYSICS = Group("Physics", sort_key=3)
 _PARAMETERS = Group("Single parameters", sort_key=4)
 _FILES = Group("Files", sort_key=6)
-
-Objective = Literal["l2cos", "l2", "chi2"]
-Weights = Literal["solid-angle", "rows"]
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
 class TexelChoices:
-    """Options of the fits; the meaning of each is that of `brdf fit`."""
+    """Options of the fits; the meaning of each is that of `brdf fit`.
+
+    The defaults are the quickest, which those of `brdf fit` are not.
+    """
 
     model: Annotated[
         str,
@@ -33,21 +35,44 @@ class TexelChoices:
             help="A sum of lobes, such as 'lambert + ggx'; see `brdf models`.",
         ),
     ] = "lambert + ggx"  # fmt: skip
+    per_channel_shape: Annotated[
+        bool,
+        Parameter(
+            negative="", show_default=False, group=_MODEL,
+            help="Shape parameters of every channel for itself.",
+        ),
+    ] = False  # fmt: skip
     objective: Annotated[
-        Objective,
+        ObjectiveChoice,
         Parameter(
             group=_MADE_SMALL,
-            help="Residual, linear in the model's value; chi2 takes the data set sigma.",
+            help="Residual. chi2 takes the data set sigma, or --noise; auto: chi2 where "
+            "the file has sigma, else log1p. Quickest: l2cos, l2, chi2.",
         ),
     ] = "l2cos"
     weights: Annotated[
-        Weights,
+        WeightsChoice,
         Parameter(
             group=_MADE_SMALL,
             help="solid-angle: a row counts for its part of the hemisphere; rows: all "
-            "alike. For l2cos.",
+            "alike. Not for l2 and chi2.",
         ),
     ] = "solid-angle"
+    robust: Annotated[
+        bool,
+        Parameter(
+            negative="", show_default=False, group=_MADE_SMALL,
+            help="Let outliers count less: about ten times as long.",
+        ),
+    ] = False  # fmt: skip
+    noise: Annotated[
+        str | None,
+        Parameter(
+            group=_MADE_SMALL,
+            help="A,B: relative and absolute (1/sr) standard uncertainty for chi2, instead "
+            "of the data set sigma.",
+        ),
+    ] = None
     max_theta: Annotated[
         float,
         Parameter(
@@ -55,6 +80,22 @@ class TexelChoices:
             help="Leave out directions beyond this polar angle, in deg.",
         ),
     ] = 85.0
+    energy: Annotated[
+        float,
+        Parameter(
+            group=_PHYSICS,
+            help="Weight of the penalty on an albedo above 1. 0 for none: it takes ten times "
+            "as long, and a hundred where it has to hold a fit.",
+        ),
+    ] = 0.0
+    reciprocity: Annotated[
+        float,
+        Parameter(
+            group=_PHYSICS,
+            help="Weight of the penalty on f(wi,wo) - f(wo,wi), for models that are not "
+            "reciprocal. 0 for none.",
+        ),
+    ] = 0.0
     fix: Annotated[
         list[str] | None,
         Parameter(negative="", group=_PARAMETERS, help="NAME=VALUE. Repeatable."),

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from fitting.cli import assignments, failures, terminal
 from fitting.cli.batch_recipe import versions
 from fitting.cli.failures import UsageError
+from fitting.cli.fit_settings import noise_of
 from fitting.cli.texels_work import RECIPE, Chunk, FitTexels
 from fitting.cli.work import Work
 
@@ -89,12 +90,19 @@ def settle(file: Path, choices: TexelChoices, who: TexelWork) -> TexelJob:
         "objective": choices.objective,
         "weights": choices.weights,
         "max_theta_deg": choices.max_theta,
+        "robust": choices.robust,
+        "noise": None if choices.noise is None else noise_of(choices.noise),
+        "energy": choices.energy,
+        "reciprocity": choices.reciprocity,
+        "per_channel_shape": choices.per_channel_shape,
     }
     for key in ("fix", "bounds", "tie"):
         found = assignments.of_lines(key, getattr(choices, key) or [])
         settings[key] = {k: getattr(v, "tolist", lambda v=v: v)() for k, v in found.items()}
-    if (choices.objective == "chi2") != source.has_sigma and choices.objective == "chi2":
-        raise UsageError(f"--objective chi2: {file} has no data set 'sigma'")
+    if choices.objective == "chi2" and not source.has_sigma and choices.noise is None:
+        raise UsageError(
+            f"--objective chi2: {file} has no data set 'sigma'; give --noise A,B"
+        )
 
     from fitting.cli import jax_setup
 
@@ -107,7 +115,7 @@ def settle(file: Path, choices: TexelChoices, who: TexelWork) -> TexelJob:
 
     model = Model(choices.model)
     with jax.enable_x64(True):
-        make_plan(
+        plan = make_plan(
             source.directions, source.shape[-1], model, texel_options(settings),
             with_sigma=source.has_sigma,
         )  # fmt: skip
@@ -134,7 +142,7 @@ def settle(file: Path, choices: TexelChoices, who: TexelWork) -> TexelJob:
         ),
         attributes={
             "model": model.expression,
-            "objective": choices.objective,
+            "objective": plan.options.objective,
             "settings_json": settings,
             "versions_json": versions(),
             "source": str(file),

@@ -17,6 +17,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 # Also where a test imports this: before JAX is loaded.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
@@ -191,9 +192,40 @@ def table(texels: int, of_scipy: int) -> tuple[list[str], dict[str, float]]:
     return lines, ratios
 
 
+# Of other settings: what is fitted, how often longer than ``l2`` that takes.
+OTHERS: dict[str, dict[str, Any]] = {
+    "log1p": {"objective": "log1p"},
+    "cbrt": {"objective": "cbrt"},
+    "l2cos, a shape per channel": {"per_channel_shape": True},
+    "log1p, robust": {"objective": "log1p", "robust": True},
+    "l2cos, energy penalty": {"energy": 1.0},
+}
+
+
+def others(texels: int) -> list[str]:
+    """Lines for people: what other settings than ``l2`` take."""
+    sample = made_up(texels)
+    unit = ours(sample).cpu
+    lines = [f"{texels} texels, times as long as l2 ({1e6 * unit:.1f} us of CPU)"]
+    for name, settings in OTHERS.items():
+
+        def run(settings: dict[str, Any] = settings) -> TexelFits:
+            return fit_many(sample.values, sample.directions, MODEL, **settings)
+
+        run()
+        own = min((timed(run, texels) for _ in range(2)), key=lambda r: r.cpu)
+        fits = own.answer
+        assert isinstance(fits, TexelFits)
+        alpha = fits.parameters["ggx.alpha"].reshape(texels, -1)[:, 0]
+        wrong = f"{wrong_minima(sample, alpha)} of {texels} wrong"
+        lines.append(f"  {name:34} {own.cpu / unit:10.1f}   {wrong}")
+    return lines
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("texels", nargs="?", type=int, default=65536)
     parser.add_argument("--of-scipy", type=int, default=100)
     given = parser.parse_args()
     print("\n".join(table(given.texels, given.of_scipy)[0]))
+    print("\n".join(others(min(given.texels, 8192))))

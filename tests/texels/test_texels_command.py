@@ -93,6 +93,33 @@ def test_mask_and_uncertainties_are_read(tmp_path, monkeypatch):
     expected = fit_many(values, ANGLES, MODEL, sigma=sigma, valid=valid, objective="chi2")
     np.testing.assert_allclose(arrays(Path("b.h5"))["cost"], expected.cost, rtol=1e-9)
     assert expected.used[3] == 180 - 36
+    # They are no weights of other objectives.
+    assert main(["texels", "a.h5", "-o", "c.h5", "-q"]) == 0
+    expected = fit_many(values, ANGLES, MODEL, valid=valid)
+    np.testing.assert_allclose(arrays(Path("c.h5"))["cost"], expected.cost, rtol=1e-9)
+    noise = ["--objective", "chi2", "--noise", "0.02,0.001"]
+    assert main(["texels", "a.h5", "-o", "d.h5", "-q", *noise]) == 0
+    settings = {"objective": "chi2", "noise": (0.02, 1e-3)}
+    expected = fit_many(values, ANGLES, MODEL, valid=valid, **settings)
+    np.testing.assert_allclose(arrays(Path("d.h5"))["cost"], expected.cost, rtol=1e-6)
+
+
+def test_a_shape_per_channel_and_other_residuals(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    values = sample(6)
+    texel_samples.write(Path("a.h5"), values.reshape(2, 3, 60, 3), ANGLES)
+    more = ["--per-channel-shape", "--objective", "auto", "-q"]
+    assert main(["texels", "a.h5", *more]) == 0
+    found = arrays(Path("a.texels.h5"))
+    settings = {"objective": "log1p", "per_channel_shape": True}
+    expected = fit_many(values, ANGLES, MODEL, **settings)
+    assert found["parameters/ggx.alpha"].shape == (2, 3, 3)
+    np.testing.assert_allclose(
+        found["parameters/ggx.alpha"].reshape(6, 3),
+        expected.parameters["ggx.alpha"], rtol=1e-6,
+    )  # fmt: skip
+    with h5py.File("a.texels.h5") as file:
+        assert file.attrs["objective"] == "log1p"
 
 
 @pytest.mark.parametrize(
@@ -100,6 +127,9 @@ def test_mask_and_uncertainties_are_read(tmp_path, monkeypatch):
     [
         ("nothing", ["-m", "gxx"], 2, "did you mean 'ggx'"),
         ("nothing", ["--objective", "chi2"], 2, "no data set 'sigma'"),
+        ("nothing", ["--noise", "0.1"], 2, "expected two numbers A,B"),
+        ("nothing", ["--noise", "0.1,0"], 2, "with the objective chi2"),
+        ("nothing", ["--energy", "-1"], 2, "a number from 0 on"),
         ("nothing", ["--workers", "0"], 2, "from 1 on"),
         ("nothing", ["--max-theta", "95"], 2, "0 to 90"),
         ("nothing", ["--fix", "ggx.beta=1"], 2, "no parameter 'ggx.beta'"),

@@ -8,6 +8,7 @@ import haste
 import jax
 import numpy as np
 import pytest
+import skewed_lobe
 import texel_samples
 from scipy.optimize import least_squares
 
@@ -94,6 +95,90 @@ def test_other_models_and_settings_agree_with_fit(sample, model, settings):
     for t in (0, 5, 11):
         single = one_by_one(sample[t], model, **settings)
         assert found.cost[t] <= single.solver.cost * (1 + 1e-6)
+
+
+def assert_agrees(many: TexelFits, t: int, single, rel: float = 1e-6) -> None:
+    """Cost, values within their uncertainties, and these, also per channel."""
+    assert many.cost[t] == pytest.approx(single.solver.cost, rel=rel)
+    for p in single.parameters:
+        found, error = many.parameters[p.name][t], many.uncertainties[p.name][t]
+        value = np.broadcast_to(np.squeeze(p.value), found.shape)
+        known = np.array(p.standard_uncertainty, float).squeeze()
+        np.testing.assert_array_equal(np.isfinite(error), np.isfinite(known), p.name)
+        some = np.isfinite(known)
+        apart = np.abs(found - value)[some] / known[some]
+        assert np.all(apart < 0.01), (p.name, apart)
+        np.testing.assert_allclose(error[some], known[some], rtol=0.01, err_msg=p.name)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"objective": "log1p"},
+        pytest.param({"objective": "asinh", "weights": "rows"}, marks=pytest.mark.slow),
+        pytest.param({"objective": "log1p", "robust": True}, marks=pytest.mark.slow),
+        pytest.param(
+            {"objective": "chi2", "noise": (0.02, 1e-3), "robust": True},
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            {"objective": "cbrt", "robust": True, "per_channel_shape": True},
+            marks=pytest.mark.slow,
+        ),
+    ],
+    ids=lambda s: " ".join(str(v) for v in s.values()),
+)
+def test_residuals_of_all_kinds_are_those_of_fit(sample, settings):
+    """Also where values are missing and where some are wrong, if that is looked at."""
+    values = sample[:12].copy()
+    if settings.get("robust"):
+        values[1, 5:20, 1] = np.nan
+        values[2, ::9] *= 1.5
+    found = fit_many(values, ANGLES, MODEL, **settings)
+    assert found.converged.all()
+    # The width of robust residuals follows from a fit that ended a little elsewhere.
+    rel = 1e-4 if "robust" in settings else 1e-6
+    for t in (0, 1, 2):
+        assert_agrees(found, t, one_by_one(values[t], MODEL, **settings), rel)
+
+
+@pytest.mark.slow
+def test_an_albedo_above_1_is_penalised_as_in_fit():
+    truth = texel_samples.truth(12)
+    truth["lambert.albedo"] = truth["lambert.albedo"] + 0.5
+    values = texel_samples.noisy(texel_samples.values_of(MODEL, truth, ANGLES))
+    free = fit_many(values, ANGLES, MODEL)
+    held = fit_many(values, ANGLES, MODEL, energy=1.0)
+    assert held.converged.all()
+    assert (held.cost > free.cost * 1.01).sum() > 3
+    for t in range(0, 12, 3):
+        single = fit(measurement(values[t]), MODEL, cross_validate=False, objective="l2cos")
+        assert single.energy.active == (held.cost[t] != free.cost[t])
+        assert_agrees(held, t, single)
+
+
+def test_lobes_that_are_not_reciprocal_are_penalised_as_in_fit(monkeypatch):
+    skewed_lobe.install(monkeypatch)
+    truth = {
+        "skewed.skew": np.full(3, 0.4),
+        "skewed.albedo": np.random.default_rng(0).uniform(0.2, 0.6, (3, 3)),
+    }
+    values = texel_samples.noisy(texel_samples.values_of("skewed", truth, ANGLES))
+    settings = {"objective": "l2cos", "energy": 0.0}
+    found = fit_many(values, ANGLES, "skewed", reciprocity=10.0, **settings)
+    free = fit_many(values, ANGLES, "skewed", reciprocity=0.0, **settings)
+    assert (found.parameters["skewed.skew"] < 0.9 * free.parameters["skewed.skew"]).all()
+    single = fit(
+        measurement(values[1]), "skewed", cross_validate=False, reciprocity=10.0, **settings
+    )
+    assert_agrees(found, 1, single)
+
+
+def test_weights_of_rows_count_as_in_fit(sample):
+    weights = np.random.default_rng(0).uniform(0.0, 2.0, 60)
+    found = fit_many(sample[:3], ANGLES, MODEL, weights=weights)
+    single = one_by_one(sample[1], MODEL, objective="l2cos", weights=weights)
+    assert_agrees(found, 1, single)
 
 
 def test_scipy_finds_nothing_better(sample):
@@ -254,10 +339,12 @@ def test_single_precision_first_ends_at_the_same(sample):
         ({"values": np.ones((4, 61, 3))}, MeasurementError, "each (61,)"),
         ({"values": np.full((4, 60, 3), "x")}, MeasurementError, "expected numbers"),
         ({"valid": np.ones((4, 60))}, MeasurementError, "valid has the shape (4, 60)"),
-        ({"objective": "log1p"}, ModelError, "l2cos, chi2, l2"),
-        ({"objective": "chi2"}, ModelError, "chi2 and sigma go together"),
-        ({"energy": 1.0}, ModelError, "without energy"),
-        ({"robust": True}, ModelError, "without robust"),
+        ({"objective": "l3"}, ModelError, "no objective 'l3'"),
+        ({"objective": "chi2"}, ModelError, "go together: give both or neither"),
+        ({"sigma": np.ones((4, 60, 3))}, ModelError, "go together: give both or neither"),
+        ({"noise": (0.1, 0.0)}, ModelError, "go together: give both or neither"),
+        ({"energy": "hard"}, ModelError, "found 'hard'"),
+        ({"material": {"ggx": "Au"}}, ModelError, "no material"),
         ({"colour": True}, ModelError, "no option colour"),
         ({"model": "lambert + gxx"}, ModelError, "did you mean 'ggx'"),
     ],
