@@ -58,6 +58,13 @@ def compiled_as_users_do(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
 
 
+@pytest.fixture
+def compiled_to_run_long() -> Iterator[None]:
+    """As users compile it, for a test that runs much longer than the compiler."""
+    with haste.compiling(in_haste=False):
+        yield
+
+
 @pytest.fixture(autouse=True, scope="module")
 def room_for_compiled_code() -> Iterator[None]:
     """Tests compile more than a process can hold."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import gzip
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import made_up_databases
@@ -16,7 +17,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 import data_formats
-from data_formats import MeasurementError
+from data_formats import MeasurementError, registry
 
 ASTM = b"VARS theta_i,phi_i,theta_s,phi_s,450nm\n\n0.1,0,0.1,0,1\n"
 SUFFIXES = [".astm", ".brdf", ".bsdf", ".csv", ".h5", ".mat", ".xml", ".txt.gz", ""]
@@ -26,6 +27,14 @@ fuzzing = settings(
     max_examples=300,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
+
+
+@pytest.fixture(autouse=True, scope="module")
+def packages_searched_once() -> Iterator[None]:
+    """Every file of no known format has the installed packages searched for more."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "entry_points", functools.cache(registry.entry_points))
+        yield
 
 
 def refuse(path: Path, **options) -> str:
@@ -256,8 +265,12 @@ def shuffle_lines(content: bytearray, rng: np.random.Generator) -> None:
 
 def shuffle_columns(content: bytearray, rng: np.random.Generator) -> None:
     lines = [line.split(b",") for line in content.split(b"\n")]
-    order = rng.permutation(max(map(len, lines)))
-    content[:] = b"\n".join(b",".join(f[k] for k in order if k < len(f)) for f in lines)
+    widths = {len(fields) for fields in lines}
+    order = rng.permutation(max(widths)).tolist()
+    of_width = {n: [k for k in order if k < n] for n in widths}
+    content[:] = b"\n".join(
+        b",".join(map(fields.__getitem__, of_width[len(fields)])) for fields in lines
+    )
 
 
 MUTATIONS = [flip, flip_early, cut, cut_out, put_in, shuffle_lines, shuffle_columns]

@@ -14,6 +14,8 @@ FOLDER = Path(__file__).parents[2] / "notebooks"
 MOST_BYTES = 200_000
 # Printed with two decimals; fits and colours differ a little from machine to machine.
 SAME = 0.015
+# Half of the picture's: a mean over the sphere changes by 0.005 with it.
+PIXELS = 75
 
 
 @pytest.fixture
@@ -37,7 +39,8 @@ def test_the_picture_is_small_and_carries_its_numbers(script):
 
 
 @pytest.mark.slow
-def test_the_numbers_in_the_picture_are_computed_again(script):
+def test_the_numbers_in_the_picture_are_computed_again(script, monkeypatch):
+    monkeypatch.setattr(script, "PIXELS", PIXELS)
     with Image.open(script.PICTURE) as picture:
         said = means(picture.info["Description"])
     again = means(script.numbers(script.compare()))

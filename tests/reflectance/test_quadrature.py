@@ -66,7 +66,7 @@ def test_cones_against_a_product_rule(lobe, shape):
 def test_two_cones_against_scipy():
     surface = clear("ggx", alpha=0.5)
     light, seen = Conical(40.0, 0.0, 6.0), Conical(35.0, 180.0, 8.0)
-    found = quantity(surface, light, seen, tolerance=1e-4)
+    found = quantity(surface, light, seen, tolerance=1e-3)
     axis = math.radians(35.0), math.pi
 
     def over_detector(turn: float, tilt: float) -> float:
@@ -133,10 +133,14 @@ def cases(count: int, seed: int):
         yield surface_of(name, shape), Directional(theta), free, side, way in ("down", "up")
 
 
+# The finest of the tolerances below may be off by a hundredth before it is told.
+FINE = 1e-8
+
+
 def check_bounds(count: int, seed: int) -> None:
     for surface, light, free, side, through in cases(count, seed):
         options: dict[str, Any] = {"side": side, "transmitted": through}
-        fine = quantity(surface, light, free, tolerance=1e-9, **options)
+        fine = quantity(surface, light, free, tolerance=FINE, **options)
         for tolerance in (1e-3, 1e-6):
             found = quantity(surface, light, free, tolerance=tolerance, **options)
             error = abs(found.value[0] - fine.value[0])
@@ -147,11 +151,13 @@ def check_bounds(count: int, seed: int) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("compiled_to_run_long")
 def test_the_error_bound_holds_for_every_lobe():
     check_bounds(30, 1)
 
 
 @pytest.mark.full
+@pytest.mark.usefixtures("compiled_to_run_long")
 def test_the_error_bound_holds_for_many_lobes():
     check_bounds(300, 2)
 
