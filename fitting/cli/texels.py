@@ -84,8 +84,8 @@ class TexelChoices:
         float,
         Parameter(
             group=_PHYSICS,
-            help="Weight of the penalty on an albedo above 1, which takes ten times as long, "
-            "and a hundred where it has to hold a fit. 0 for none.",
+            help="Weight of the penalty on an albedo above 1, which takes ten times as "
+            "long, and a hundred where it has to hold a fit. 0 for none.",
         ),
     ] = 0.0
     reciprocity: Annotated[
