@@ -145,11 +145,12 @@ def predicted(task: Task, u: Array, x: Array) -> Array:
 def penalties_of(task: Task, scale: Array, u: Array, x: Array) -> Array:
     """What penalties add to the costs, ``(t,)``."""
 
-    def one(scale: Array, u: Array, x: Array) -> Array:
+    def one(at: tuple[Array, Array, Array]) -> Array:
         nothing = jnp.zeros((1, 0))
-        return penalty_cost(task, Seen(nothing, nothing, None, None, scale), u, x)
+        return penalty_cost(task, Seen(nothing, nothing, None, None, at[0]), *at[1:])
 
-    return jax.vmap(one)(scale, u, x)
+    # So many directions of light for each that memory would grow with a batch.
+    return jax.lax.map(one, (scale, u, x), batch_size=lanes().own)
 
 
 def _each(function: Any, texels: Texels, *others: Any) -> Any:
