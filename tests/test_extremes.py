@@ -123,6 +123,7 @@ def test_a_lobe_narrower_than_the_sampling_is_called_so():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("compiled_to_run_long")
 def test_a_million_rows():
     rng, n = np.random.default_rng(1), 10**6
     theta_i = np.radians(rng.choice(synthetic.THETA_I_DEG, n))
