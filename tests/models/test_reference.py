@@ -354,6 +354,7 @@ def test_oren_nayar_exceeds_one_at_grazing_by_what_it_declares():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("compiled_to_run_long")
 @pytest.mark.parametrize("name", ["ggx", "beckmann", "ward"])
 def test_declared_error_of_the_quadrature(name: str):
     """Against many more nodes, for elongated lobes across and along the plane."""
