@@ -17,6 +17,9 @@ from fitting.solid_angle import (
 
 _SAME_DIRECTION = 1e-3
 _WIDEST_GAP = np.radians(20.0)
+# Where two tables are compared; and between the azimuths of rings, more than a half turn.
+_AZIMUTHS = np.radians(np.arange(0.0, 181.0, 10.0))
+_APART = 10.0
 
 
 class Albedo(NamedTuple):
@@ -71,15 +74,16 @@ def data_reciprocity(m: Measurement) -> tuple[float, int] | None:
     For every pair of measured polar angles of incidence ``a, b`` of reflected light, on
     either side of the sample, and azimuth differences,
     the table of ``a`` is interpolated linearly at ``theta_r = b`` and the other way round,
-    over the mean of the channels. Gaps of more than 20 deg are not bridged. None where the
-    sampling leaves no pair.
+    over the mean of the channels and, where the azimuths of both halves are measured, of
+    these. Gaps of more than 20 deg between polar angles are not bridged, and azimuths are
+    left out that are further than 10 deg from a measured one. None where the sampling
+    leaves no pair.
     """
     found: list[np.ndarray] = []
     for side in (~m.from_back, m.from_back):
         tables = _tables(m, ~m.transmitted & side)
-        for i, one in enumerate(tables):
-            for other in tables[i + 1 :]:
-                found.append(_differences(one, other))
+        there, back = _compared(tables, tables)
+        found.append(_differences(there, back)[np.triu_indices(len(tables), 1)])
     return _median(found)
 
 
@@ -94,14 +98,11 @@ def data_transmitted_reciprocity(
     """
     down = _tables(m, m.transmitted & ~m.from_back, relative_index**-2.0)
     up = _tables(m, m.transmitted & m.from_back)
-    return _median([_differences(one, other) for one in down for other in up])
-
-
-_Table = tuple[float, "_Rings"]
+    return _median([_differences(*_compared(down, up))])
 
 
 def _tables(m: Measurement, chosen: np.ndarray, factor: float = 1.0) -> list[_Table]:
-    """Per angle of incidence: the angle, and values over the detector's directions.
+    """Per angle of incidence: values over the detector's directions.
 
     Angles are those to the normal of the side that a direction is on.
     """
@@ -110,75 +111,99 @@ def _tables(m: Measurement, chosen: np.ndarray, factor: float = 1.0) -> list[_Ta
     count = np.maximum(m.valid.sum(axis=1), 1)
     mean = factor * np.where(m.valid, m.value, 0.0).sum(axis=1) / count
     tables: list[_Table] = []
+    theta_i, theta_r = from_normal(m.theta_i), from_normal(m.theta_r)
     for k in np.unique(label[some]):
         rows = np.flatnonzero(some & (label == k))
         # Both halves folded onto one: isotropic data are compared as if symmetric.
         delta = np.abs(np.arctan2(*_sin_cos(m.phi_r[rows] - m.phi_i[rows])))
-        table = _Rings.of(from_normal(m.theta_r[rows]), delta, mean[rows])
-        if table.theta.size < 3:
-            continue
-        tables.append((float(from_normal(m.theta_i[rows]).mean()), table))
+        table = _table(float(theta_i[rows].mean()), theta_r[rows], delta, mean[rows])
+        if table.theta.size >= 3:
+            tables.append(table)
     return tables
 
 
-def _differences(one: _Table, other: _Table) -> np.ndarray:
-    """Relative differences of the one at the angle of the other, and the reverse."""
-    azimuth = np.radians(np.arange(0.0, 181.0, 10.0))
-    there, back = one[1].at(other[0], azimuth), other[1].at(one[0], azimuth)
+def _compared(ones: list[_Table], others: list[_Table]) -> tuple[np.ndarray, np.ndarray]:
+    """``(a, b, azimuths)``: each of the ones at the angle of each other; the reverse."""
+    shape = len(ones), len(others), _AZIMUTHS.size
+    angles = np.array([t.theta_i for t in others]), np.array([t.theta_i for t in ones])
+    there = np.reshape([t.at(angles[0]) for t in ones], shape)
+    back = np.reshape([t.at(angles[1]) for t in others], (shape[1], shape[0], shape[2]))
+    return there, np.swapaxes(back, 0, 1)
+
+
+def _differences(there: np.ndarray, back: np.ndarray) -> np.ndarray:
+    """Relative differences, NaN where there is nothing to compare."""
     size = 0.5 * (np.abs(there) + np.abs(back))
-    good = np.isfinite(there) & np.isfinite(back) & (size > 0)
-    return np.abs(there - back)[good] / size[good]
+    good = size > 0
+    return np.where(good, np.abs(there - back), np.nan) / np.where(good, size, 1.0)
 
 
 def _median(differences: list[np.ndarray]) -> tuple[float, int] | None:
-    joined = np.concatenate(differences) if differences else np.zeros(0)
+    joined = np.concatenate([d.ravel() for d in differences])
+    joined = joined[~np.isnan(joined)]
     if joined.size == 0:
         return None
     return float(np.median(joined)), int(joined.size)
 
 
 @dataclass(frozen=True)
-class _Rings:
-    """A table of one incidence: polar angles, and per ring azimuths and values."""
+class _Table:
+    """One incidence: rings of polar angles ``theta (r,)``, and on each of them values at
+    `_AZIMUTHS`, ``(r, azimuths)``, NaN where nothing was measured near."""
 
+    theta_i: float
     theta: np.ndarray
-    rings: list[tuple[np.ndarray, np.ndarray]]
+    rings: np.ndarray
 
-    @staticmethod
-    def of(theta: np.ndarray, delta: np.ndarray, value: np.ndarray) -> _Rings:
-        ring = angle_labels(theta)
-        levels, rings = [], []
-        for k in range(ring.max() + 1):
-            rows = np.flatnonzero(ring == k)
-            rows = rows[np.argsort(delta[rows], kind="stable")]
-            levels.append(theta[rows].mean())
-            rings.append((delta[rows], value[rows]))
-        return _Rings(np.asarray(levels), rings)
+    def at(self, theta: np.ndarray) -> np.ndarray:
+        """Linear between the two neighbouring rings of angles ``(q,)``; else NaN."""
+        above = np.searchsorted(self.theta, theta - _SAME_DIRECTION)
+        high, low = np.minimum(above, self.theta.size - 1), np.maximum(above - 1, 0)
+        upper, lower = self.theta[high], self.theta[low]
+        same = np.abs(upper - theta) < _SAME_DIRECTION
+        between = (above > 0) & (upper - lower <= _WIDEST_GAP)
+        known = (above < self.theta.size) & (same | between)
+        wide = np.where(upper > lower, upper - lower, 1.0)
+        share = np.where(same, 1.0, (theta - lower) / wide)[:, None]
+        mixed = (1 - share) * self.rings[low] + share * self.rings[high]
+        out = np.where(same[:, None], self.rings[high], mixed)
+        return np.where(known[:, None], out, np.nan)
 
-    def at(self, theta: float, azimuth: np.ndarray) -> np.ndarray:
-        """Linear in azimuth on the two neighbouring rings and between them; else NaN."""
-        above = int(np.searchsorted(self.theta, theta - _SAME_DIRECTION))
-        if above == self.theta.size:
-            return np.full(azimuth.size, np.nan)
-        upper = self._on_ring(above, azimuth)
-        if abs(self.theta[above] - theta) < _SAME_DIRECTION:
-            return upper
-        if above == 0 or self.theta[above] - self.theta[above - 1] > _WIDEST_GAP:
-            return np.full(azimuth.size, np.nan)
-        low, high = self.theta[above - 1], self.theta[above]
-        share = (theta - low) / (high - low)
-        return (1 - share) * self._on_ring(above - 1, azimuth) + share * upper
 
-    def _on_ring(self, k: int, azimuth: np.ndarray) -> np.ndarray:
-        delta, value = self.rings[k]
-        if self.theta[k] < _SAME_DIRECTION:
-            return np.full(azimuth.size, value.mean())
-        nearest = np.abs(azimuth[:, None] - delta).min(axis=1)
-        inside = (azimuth > delta[0] - _SAME_DIRECTION) & (
-            azimuth < delta[-1] + _SAME_DIRECTION
-        )
-        good = inside & (nearest < 0.5 * _WIDEST_GAP)
-        return np.where(good, np.interp(azimuth, delta, value), np.nan)
+def _table(
+    theta_i: float, theta: np.ndarray, delta: np.ndarray, value: np.ndarray
+) -> _Table:
+    """Linear in azimuth on every ring, all of them at once."""
+    ring = angle_labels(theta)
+    level, normal = _means(ring, theta), _means(ring, value)
+    order = np.lexsort((delta, ring))
+    ring, delta, value = ring[order], delta[order], value[order]
+    # Rows of one direction count as their mean, such as those of both halves.
+    new = (np.diff(ring, prepend=-1) > 0) | (np.diff(delta, prepend=0.0) > _SAME_DIRECTION)
+    spot = np.cumsum(new) - 1
+    ring, delta, value = ring[new], _means(spot, delta), _means(spot, value)
+    count = np.bincount(ring)
+    last = np.cumsum(count)[:, None] - 1
+    first = last - count[:, None] + 1
+    # Azimuths are below pi: one search among those of all rings.
+    query = _APART * np.arange(count.size)[:, None] + _AZIMUTHS
+    place = np.searchsorted(_APART * ring + delta, query, side="right")
+    low, high = np.clip(place - 1, first, last), np.clip(place, first, last)
+    gap = delta[high] - delta[low]
+    slope = (value[high] - value[low]) / np.where(gap > 0, gap, 1.0)
+    rings = value[low] + slope * (_AZIMUTHS - delta[low])
+    nearest = np.minimum(np.abs(_AZIMUTHS - delta[low]), np.abs(_AZIMUTHS - delta[high]))
+    inside = (delta[first] - _AZIMUTHS < _SAME_DIRECTION) & (
+        _AZIMUTHS - delta[last] < _SAME_DIRECTION
+    )
+    near = nearest < 0.5 * _WIDEST_GAP + _SAME_DIRECTION
+    rings = np.where(inside & near, rings, np.nan)
+    at_normal = (level < _SAME_DIRECTION)[:, None]
+    return _Table(theta_i, level, np.where(at_normal, normal[:, None], rings))
+
+
+def _means(label: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.bincount(label, values) / np.bincount(label)
 
 
 def _sin_cos(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

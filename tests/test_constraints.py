@@ -11,7 +11,7 @@ import pytest
 import skewed_lobe
 import synthetic
 
-from data_formats import Channel
+from data_formats import Channel, Measurement
 from fitting import ModelError, colour, diagnostics, fit, objectives
 from fitting.albedo import model_albedo
 from fitting.model import Model
@@ -138,6 +138,32 @@ def test_reciprocity_of_data():
     assert diagnostics.data_reciprocity(bad)[0] > 0.1
     one = good.select(good.theta_i == good.theta_i[-1])
     assert diagnostics.data_reciprocity(one) is None
+
+
+def test_data_of_both_halves_count_as_their_mean():
+    """Whichever half comes first; azimuths that differ by a rounding are the same."""
+    angles = synthetic.directions(theta_i_deg=(0.0, 16.0, 32.0, 48.0, 64.0), azimuths=19)
+    values = {"lambert.albedo": np.array([0.5]), "ggx.alpha": 0.5}
+    good = synthetic.measurement("lambert + ggx", values, angles=angles)
+    skew = 1.0 + 0.2 * good.theta_i[:, None]
+
+    def both(first: int) -> Measurement:
+        parts = {1: good.value * skew, -1: good.value * (2.0 - skew)}
+        turned = [s * good.phi_r * (1.0 + 1e-15) for s in (first, -first)]
+        return dataclasses.replace(
+            good,
+            theta_i=np.tile(good.theta_i, 2),
+            phi_i=np.tile(good.phi_i, 2),
+            theta_r=np.tile(good.theta_r, 2),
+            phi_r=np.concatenate(turned),
+            value=np.concatenate([parts[first], parts[-first]]),
+            valid=np.tile(good.valid, (2, 1)),
+        )
+
+    for first in (1, -1):
+        median, pairs = diagnostics.data_reciprocity(both(first))
+        assert pairs == diagnostics.data_reciprocity(good)[1]
+        assert median < 1e-9
 
 
 @pytest.mark.parametrize("name", list(objectives.OBJECTIVES))
