@@ -1,4 +1,4 @@
-"""Basis functions of a lobe at many pairs of directions, compiled for few sizes."""
+"""Basis functions of a lobe at many pairs of directions, compiled for one size."""
 
 from __future__ import annotations
 
@@ -11,23 +11,22 @@ from fitting.compiled import compiled
 from fitting.geometry import Geometry, from_components
 from fitting.models import Lobe, Shape
 
-SMALL, LARGE = 1 << 12, 1 << 16
+# Rows at a time: they stay in the cache of a core, and few do not wait for many.
+SIZE = 1 << 12
 
 
 def basis_values(lobe: Lobe, shape: Shape, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
     """``(n, J, C)`` of directions ``(n, 3)``, in 1/sr, in float64.
 
-    Shape parameters are scalars (then C is 1) or ``(C,)``. Rows are padded to one of two
-    sizes, so that a lobe is compiled twice at most.
+    Shape parameters are scalars (then C is 1) or ``(C,)``.
     """
     n = len(wi)
     out = []
     with jax.enable_x64(True):
         own = {k: jnp.asarray(v, jnp.float64) for k, v in shape.items()}
-        for k, size in chunks(n):
-            geometry = padded_geometry(wi[k : k + size], wo[k : k + size], size)
-            values = np.asarray(_basis(lobe, own, geometry))
-            out.append(np.moveaxis(values, -1, 0)[: n - k])
+        for part in parts(n):
+            values = np.asarray(_basis(lobe, own, padded_geometry(wi[part], wo[part])))
+            out.append(np.moveaxis(values, -1, 0)[: n - part.start])
     return np.concatenate(out)
 
 
@@ -41,10 +40,10 @@ def basis_sums(
     with jax.enable_x64(True):
         own = {k: jnp.asarray(v, jnp.float64) for k, v in shape.items()}
         total, slopes = None, {}
-        for k, size in chunks(len(wi)):
-            geometry = padded_geometry(wi[k : k + size], wo[k : k + size], size)
-            w = np.zeros(size)
-            w[: len(weight[k : k + size])] = weight[k : k + size]
+        for part in parts(len(wi)):
+            geometry = padded_geometry(wi[part], wo[part])
+            w = np.zeros(SIZE)
+            w[: len(weight[part])] = weight[part]
             value, slope = _sums(lobe, own, geometry, jnp.asarray(w))
             total = np.asarray(value) if total is None else total + np.asarray(value)
             slopes = {n: slopes.get(n, 0.0) + np.asarray(s) for n, s in slope.items()}
@@ -52,14 +51,12 @@ def basis_sums(
     return total, slopes
 
 
-def chunks(n: int) -> list[tuple[int, int]]:
-    """First row and padded size of each chunk of ``n`` rows."""
-    if n <= SMALL:
-        return [(0, SMALL)]
-    return [(k, LARGE) for k in range(0, n, LARGE)]
+def parts(n: int) -> list[slice]:
+    """``n`` rows, `SIZE` at a time."""
+    return [slice(k, k + SIZE) for k in range(0, max(n, 1), SIZE)]
 
 
-def padded_geometry(wi: np.ndarray, wo: np.ndarray, size: int) -> Geometry:
+def padded_geometry(wi: np.ndarray, wo: np.ndarray, size: int = SIZE) -> Geometry:
     """The geometry of some rows, and of the normal for the rest."""
     columns = []
     for w in (wi, wo):

@@ -19,7 +19,7 @@ from fitting.reflectance.beams import (
     nicodemus_name,
     projected_solid_angle,
 )
-from fitting.reflectance.kernel import LARGE, basis_sums, basis_table, padded_geometry
+from fitting.reflectance.kernel import basis_sums, basis_table, padded_geometry
 from fitting.reflectance.nested import Nodes, Radiance, Setting, lobe_nodes
 from fitting.reflectance.surface import (
     Surface,
@@ -30,6 +30,8 @@ from fitting.reflectance.surface import (
 from fitting.result import FitResult
 
 TOLERANCE = 1e-6
+# Nodes at a time, so that memory does not grow with them.
+_BLOCK = 1 << 16
 
 
 class Reflectance(msgspec.Struct, frozen=True):
@@ -103,8 +105,8 @@ class Rule:
                 n: jnp.broadcast_to(jnp.asarray(v), total.shape) for n, v in own.items()
             }
             integral = jnp.zeros(())
-            for k in range(0, len(nodes.weight), LARGE):
-                rows = slice(k, k + LARGE)
+            for k in range(0, len(nodes.weight), _BLOCK):
+                rows = slice(k, k + _BLOCK)
                 w = jnp.asarray(nodes.weight[rows])
                 geometry = padded_geometry(nodes.wi[rows], nodes.wo[rows], w.size)
                 integral = integral + basis_table(lobe, shape, geometry) @ w
