@@ -133,14 +133,10 @@ def cases(count: int, seed: int):
         yield surface_of(name, shape), Directional(theta), free, side, way in ("down", "up")
 
 
-# The finest of the tolerances below may be off by a hundredth before it is told.
-FINE = 1e-8
-
-
 def check_bounds(count: int, seed: int) -> None:
     for surface, light, free, side, through in cases(count, seed):
         options: dict[str, Any] = {"side": side, "transmitted": through}
-        fine = quantity(surface, light, free, tolerance=FINE, **options)
+        fine = quantity(surface, light, free, tolerance=1e-9, **options)
         for tolerance in (1e-3, 1e-6):
             found = quantity(surface, light, free, tolerance=tolerance, **options)
             error = abs(found.value[0] - fine.value[0])
