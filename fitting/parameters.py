@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
@@ -14,6 +15,8 @@ from jax import Array
 
 AnyArray = TypeVar("AnyArray", Array, np.ndarray, float)
 Scale = Literal["log", "linear", "periodic"]
+# Of the real line: a share of 5e-4 of the support is left, and 12 %.
+_FLAT, _INSIDE = 7.6, 2.0
 
 
 @dataclass(frozen=True)
@@ -126,3 +129,18 @@ def to_real_line(scale: Scale, value: float, lower: float, upper: float) -> floa
         share = (value - lower) / (upper - lower)
     share = min(max(share, 1e-6), 1 - 1e-6)
     return math.log(share / (1 - share))
+
+
+def is_flat(scales: Sequence[Scale], u: np.ndarray) -> np.ndarray:
+    """Which points ``(..., k)`` are where the map onto the support is flat.
+
+    A long step can carry a parameter there, and nothing leads back although the minimum
+    may lie inside.
+    """
+    periodic = np.array([s == "periodic" for s in scales], dtype=bool)
+    return (np.abs(u) > _FLAT) & ~periodic
+
+
+def from_inside(u: np.ndarray, flat: np.ndarray) -> np.ndarray:
+    """The points, those which are flat moved to where they can go on."""
+    return np.where(flat, np.sign(u) * _INSIDE, u)

@@ -15,6 +15,7 @@ from fitting import ahead, judge, starts
 from fitting.model import Model
 from fitting.objectives import ROBUST_WIDTH
 from fitting.options import FitOptions
+from fitting.parameters import from_inside, is_flat
 from fitting.predict import predict_geometry
 from fitting.problem import for_channel, prepare
 from fitting.reduced import Problem
@@ -22,8 +23,6 @@ from fitting.rows import Rows
 from fitting.solve import Solution, refine
 from fitting.summary import Found, joined_values
 
-# In the unknowns of the solver: a share of 5e-4 of the support is left, and 12 %.
-_FLAT, _INSIDE = 7.6, 2.0
 _PULLS = 4
 _BETTER = 1e-6
 
@@ -77,18 +76,13 @@ def refined(p: Problem, u: ArrayLike, x: ArrayLike) -> Solution:
 
 
 def _pulled_back(p: Problem, end: Solution) -> Solution:
-    """Once more from inside, if shape parameters ended at their bounds.
-
-    A long step can carry a parameter to where the map onto its support is flat, and
-    nothing leads back from there although the minimum may lie inside.
-    """
-    periodic = np.array([s == "periodic" for s in p.unknowns.scales], dtype=bool)
+    """Once more from inside, if shape parameters ended at their bounds."""
     for _ in range(_PULLS):
         u = np.asarray(end.u)
-        stuck = (np.abs(u) > _FLAT) & ~periodic
+        stuck = is_flat(p.unknowns.scales, u)
         if not stuck.any():
             break
-        new = refined(p, np.where(stuck, np.sign(u) * _INSIDE, u), end.x)
+        new = refined(p, from_inside(u, stuck), end.x)
         if not float(new.cost) < float(end.cost) * (1.0 - _BETTER):
             break
         end = new

@@ -25,7 +25,7 @@ def basis_values(lobe: Lobe, shape: Shape, wi: np.ndarray, wo: np.ndarray) -> np
     with jax.enable_x64(True):
         own = {k: jnp.asarray(v, jnp.float64) for k, v in shape.items()}
         for part in parts(n):
-            values = np.asarray(_basis(lobe, own, padded_geometry(wi[part], wo[part])))
+            values = np.asarray(_basis(lobe, own, padded_directions(wi[part], wo[part])))
             out.append(np.moveaxis(values, -1, 0)[: n - part.start])
     return np.concatenate(out)
 
@@ -41,7 +41,7 @@ def basis_sums(
         own = {k: jnp.asarray(v, jnp.float64) for k, v in shape.items()}
         total, slopes = None, {}
         for part in parts(len(wi)):
-            geometry = padded_geometry(wi[part], wo[part])
+            geometry = padded_directions(wi[part], wo[part])
             w = np.zeros(SIZE)
             w[: len(weight[part])] = weight[part]
             value, slope = _sums(lobe, own, geometry, jnp.asarray(w))
@@ -56,7 +56,7 @@ def parts(n: int) -> list[slice]:
     return [slice(k, k + SIZE) for k in range(0, max(n, 1), SIZE)]
 
 
-def padded_geometry(wi: np.ndarray, wo: np.ndarray, size: int = SIZE) -> Geometry:
+def padded_directions(wi: np.ndarray, wo: np.ndarray, size: int = SIZE) -> Geometry:
     """The geometry of some rows, and of the normal for the rest."""
     columns = []
     for w in (wi, wo):

@@ -19,7 +19,7 @@ from fitting.reflectance.beams import (
     nicodemus_name,
     projected_solid_angle,
 )
-from fitting.reflectance.kernel import basis_sums, basis_table, padded_geometry
+from fitting.reflectance.kernel import basis_sums, basis_table, padded_directions
 from fitting.reflectance.nested import Nodes, Radiance, Setting, lobe_nodes
 from fitting.reflectance.surface import (
     Surface,
@@ -108,7 +108,7 @@ class Rule:
             for k in range(0, len(nodes.weight), _BLOCK):
                 rows = slice(k, k + _BLOCK)
                 w = jnp.asarray(nodes.weight[rows])
-                geometry = padded_geometry(nodes.wi[rows], nodes.wo[rows], w.size)
+                geometry = padded_directions(nodes.wi[rows], nodes.wo[rows], w.size)
                 integral = integral + basis_table(lobe, shape, geometry) @ w
             total = total + jnp.sum(lobe_amplitudes(lobe, wide) * integral, axis=0)
         return self.scale * total

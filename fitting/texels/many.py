@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from fitting.parameters import from_inside, is_flat
 from fitting.texels import abreast
 from fitting.texels.abreast import (
     Data,
@@ -35,8 +36,6 @@ _MAX_STEPS = 200
 # A second start is refined where the scan does not tell it from the first by this factor.
 _FAR_COSTLIER = 4.0
 _SAME_MINIMUM = 1e-6
-# Beyond this the map onto a parameter's support is flat: from inside once more.
-_FLAT, _INSIDE = 7.6, 2.0
 
 
 class Found(NamedTuple):
@@ -142,7 +141,7 @@ class _Rest(NamedTuple):
         flat = _flat(self.task, state)
         stuck = np.flatnonzero(flat.any(axis=1))
         if stuck.size:
-            u = np.where(flat, np.sign(state.u) * _INSIDE, state.u)[stuck]
+            u = from_inside(np.asarray(state.u), flat)[stuck]
             some = self._replace(data=_taken(self.data, stuck))
             new = some._descended(_begun(self.task, u, state.blocks.x[stuck]))
             _replace(state, stuck, new, new.blocks.cost < state.blocks.cost[stuck])
@@ -202,8 +201,7 @@ def _ends(state: State) -> Starts:
 
 def _flat(task: Task, state: State) -> np.ndarray:
     """Which shapes ``(t, k)`` are where a map onto a support is flat."""
-    periodic = np.array([s == "periodic" for s in task.problem.unknowns.scales], dtype=bool)
-    return (np.abs(state.u) > _FLAT) & ~periodic
+    return is_flat(task.problem.unknowns.scales, np.asarray(state.u))
 
 
 def _roughly(task: Task, texels: Texels, state: State, few: Any) -> State:
