@@ -131,14 +131,14 @@ def to_real_line(scale: Scale, value: float, lower: float, upper: float) -> floa
     return math.log(share / (1 - share))
 
 
-def is_flat(scales: Sequence[Scale], u: np.ndarray) -> np.ndarray:
-    """Which points ``(..., k)`` are where the map onto the support is flat.
+def is_flat(scales: Sequence[Scale], u: Any) -> Any:
+    """Which points ``(..., k)`` are at a bound, where the map onto the support is flat.
 
     A long step can carry a parameter there, and nothing leads back although the minimum
     may lie inside.
     """
     periodic = np.array([s == "periodic" for s in scales], dtype=bool)
-    return (np.abs(u) > _FLAT) & ~periodic
+    return (abs(u) > _FLAT) & ~periodic
 
 
 def from_inside(u: np.ndarray, flat: np.ndarray) -> np.ndarray:

@@ -27,6 +27,8 @@ _SAME_ANGLE = 1e-10
 _MOST_ANGLES = 512
 # Relative, and as a share of the median.
 _NOISE = 0.02
+# Sizes below this have no square.
+TINY = 1e-140
 # How often a fit is made again with the noise that follows from it.
 NOISE_ROUNDS = 2
 
@@ -94,18 +96,25 @@ def standard_uncertainty(rows: Rows, options: FitOptions) -> np.ndarray:
         return rows.sigma
     value = rows.value if rows.fitted is None else rows.fitted
     magnitude = np.abs(np.where(rows.valid, value, 0.0))
-    typical = np.median(np.abs(rows.value[rows.valid]))
-    return assumed_noise(magnitude, typical, options.noise)
+    known = np.abs(rows.value[rows.valid])
+    return assumed_noise(magnitude, np.median(known), np.mean(known), options.noise)
 
 
 def assumed_noise(
-    magnitude: np.ndarray, typical: ArrayLike, noise: tuple[float, float] | None
+    magnitude: np.ndarray,
+    median: ArrayLike,
+    mean: ArrayLike,
+    noise: tuple[float, float] | None,
 ) -> np.ndarray:
-    """Standard uncertainties where values are as large, and ``typical`` is their median."""
-    typical = np.asarray(typical)
+    """Standard uncertainties above 0 of values of a magnitude, with their median and mean.
+
+    The mean is looked at where the median is 0, and where that is, too, all are alike.
+    """
+    median, mean = np.asarray(median), np.asarray(mean)
+    typical = np.where(median > TINY, median, np.where(mean > TINY, mean, 1.0))
     relative, absolute = noise or (_NOISE, _NOISE * typical)
     # A relative noise alone leaves nothing where the value is 0.
-    floor = 1e-6 * typical + 1e-300
+    floor = 1e-6 * typical
     return np.sqrt((relative * magnitude) ** 2 + absolute**2 + floor**2)
 
 

@@ -75,7 +75,8 @@ def solve(
     d = jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
     g = g / (d[:, None] * d) + _RIDGE * jnp.eye(d.shape[0], dtype=g.dtype)[:, :, None]
     b = b / d
-    size = jnp.maximum(jnp.max(jnp.abs(b), axis=0), 1e-300)
+    # Far from the least number, of which products below would be taken for 0.
+    size = jnp.maximum(jnp.max(jnp.abs(b), axis=0), 1e-200)
     b = b / size
 
     def unscaled(x: Array, free: Array) -> tuple[Array, Array]:

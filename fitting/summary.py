@@ -9,13 +9,11 @@ import numpy as np
 
 from fitting import identifiability
 from fitting.model import Model
-from fitting.parameters import slope_of_value
+from fitting.parameters import is_flat, slope_of_value
 from fitting.reduced import Problem
 from fitting.result import Correlations, ParameterResult, finite_or_none
 from fitting.solve import Solution
 from fitting.uncertainty import Covariance
-
-_AT_BOUND_SHARE = 5e-4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,9 +96,7 @@ def _errors(f: Found, cov: Covariance) -> _Errors:
             for j in range(k)
         ]
     )
-    share = 1.0 / (1.0 + np.exp(-u))
-    periodic = np.array([s == "periodic" for s in unknowns.scales], dtype=bool)
-    shape_at = (np.minimum(share, 1 - share) < _AT_BOUND_SHARE) & ~periodic
+    shape_at = is_flat(unknowns.scales, u)
     scale = np.concatenate([np.ones(c * m), slope])
     matrix = np.asarray(cov.matrix) * np.outer(scale, scale)
     rows, active = np.asarray(unknowns.rows), np.asarray(cov.active)

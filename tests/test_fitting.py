@@ -383,6 +383,20 @@ def test_a_channel_without_a_valid_value_says_so(paint):
     assert r.parameter("ggx.f90").standard_uncertainty[0] is not None
 
 
+def test_a_dark_channel_does_not_spoil_the_others_where_noise_has_no_floor(paint):
+    value = paint.value.copy()
+    value[:, 1] = 0.0
+    dark = dataclasses.replace(paint, value=value)
+    options = {"objective": "chi2", "noise": (0.02, 0.0), "cross_validate": False}
+    r = fit(dark, "lambert + ggx", **options)
+    assert r.solver.converged
+    assert r.parameter("lambert.albedo").value[1] == 0.0
+    alone = fit(paint, "lambert + ggx", **options)
+    assert r.parameter("ggx.alpha").value[0] == pytest.approx(
+        alone.parameter("ggx.alpha").value[0], rel=0.01
+    )
+
+
 def test_scattered_angles_of_incidence_are_put_together_by_degrees():
     rng = np.random.default_rng(1)
     angles = (

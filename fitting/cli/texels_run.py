@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import time
 from collections.abc import Mapping
@@ -81,6 +82,8 @@ def settle(file: Path, choices: TexelChoices, who: TexelWork) -> TexelJob:
         raise UsageError(f"--workers {who.workers}: expected a number from 1 on")
     if not 0 < choices.max_theta <= 90:
         raise UsageError(f"--max-theta {choices.max_theta:g}: expected 0 to 90 degrees")
+    if not (math.isfinite(choices.energy) and choices.energy >= 0):
+        raise UsageError(f"--energy {choices.energy:g}: expected a number from 0 on")
     from fitting.texels.source import open_source
 
     source = open_source(file)
@@ -143,6 +146,7 @@ def settle(file: Path, choices: TexelChoices, who: TexelWork) -> TexelJob:
         attributes={
             "model": model.expression,
             "objective": plan.options.objective,
+            "unseen_json": plan.unseen,
             "settings_json": settings,
             "versions_json": versions(),
             "source": str(file),
@@ -163,6 +167,9 @@ def run(job: TexelJob, who: TexelWork, *, quiet: bool) -> Fitted:
     todo = {str(c.first): c for c in job.chunks if not part_path(folder, c.first).exists()}
     new, reason, code = 0, None, failures.NOT_CONVERGED
     progress = _Progress(job, todo, quiet=quiet)
+    for sentence in job.attributes["unseen_json"]:
+        if not quiet:
+            terminal.stderr().print(sentence, style="dim", soft_wrap=True)
     engine = _engine(who, len(todo), progress)
     try:
         with progress, closing(engine.run(job.work, todo, retries=_RETRIES)) as answers:

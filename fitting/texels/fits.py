@@ -33,13 +33,14 @@ class TexelFits:
     - ``parameters``: by name, shape parameters ``(t,)`` and coefficients ``(t, c)``; all
       ``(t, c)`` where each channel has its own shape.
     - ``uncertainties``: the same, standard (k = 1), those of `fitting.uncertainty`; NaN
-      for what is fixed or held by a bound.
+      for what is fixed, held by a bound or of no influence.
     - ``cost``: the sum of squares that was made small.
     - ``converged``, ``steps``, ``used``: whether and in how many steps, and of how many
       values.
     - ``runner_up``: cost of another minimum over that of this one, NaN if none came near.
 
-    All parameters are NaN where too few values are known.
+    All parameters are NaN where too few values are known in one of the channels; where each
+    has its own shape, those of that channel, which then counts for nothing.
     """
 
     parameters: dict[str, np.ndarray]
@@ -79,7 +80,8 @@ def fit_many(
     ``sigma``, standard uncertainties for ``chi2``, has the shape of the values.
     ``settings`` are fields of `FitOptions`, whose defaults here are the quickest: the
     objective ``l2cos``, in which the residual is linear in the model's value, and no
-    penalties. Others take several times as long. ``progress`` is called with texels done.
+    penalties. Others take several times as long. Solid angles are those of all directions,
+    also for texels that lack some. ``progress`` is called with texels done.
     ``single_first``: float32 as far as it goes and then float64, for GPUs that are slow at
     the latter.
 
@@ -152,6 +154,10 @@ def named(
             parameters[name] = found[plural][:, i]
             uncertainties[name] = found[f"{kind}_uncertainty"][:, i]
     order = problem.model.parameters()
+    for name, declared in order.items():
+        if declared.scale == "periodic":
+            first, last = declared.support
+            parameters[name] = np.mod(parameters[name] - first, last - first)
     return {n: parameters[n] for n in order}, {n: uncertainties[n] for n in order}
 
 

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from fitting.parameters import is_flat
 from fitting.texels.arrow import evaluate, penalty_cost
 from fitting.texels.descent import State
 from fitting.texels.seen import Seen
@@ -21,10 +22,10 @@ _SURPRISING, _ROUNDING = 0.1, 1e-9
 class Outcome(NamedTuple):
     """One texel's: all shape parameters and coefficients, in the unknowns' order.
 
-    Uncertainties (k = 1) are NaN for what is fixed or held by a bound; all is NaN where
-    too few values are known. ``used`` counts values of all channels. ``as_promised`` tells
-    whether the last step gained what the quadratic said. Where it gained less by a share
-    ``s``, about ``s^2`` of the promise is left to be gained.
+    Uncertainties (k = 1) are NaN for what is fixed, held by a bound or of no influence; all
+    is NaN where too few values are known in a channel. ``used`` counts values of all
+    channels. ``as_promised`` tells whether the last step gained what the quadratic said:
+    where it gained less by a share ``s``, about ``s^2`` of the promise is left.
     """
 
     shape: Float[Array, " s"]
@@ -52,6 +53,11 @@ def outcome(task: Task, seen: Seen, state: State, used: Int[Array, " c"]) -> Out
     surprise = jnp.abs(b.cost - last - state.predicted)
     as_promised = surprise <= _SURPRISING * state.predicted + _ROUNDING * b.cost
     enough = jnp.all(used >= m) & (number >= m * used.size + k) & jnp.isfinite(cost)
+    # With no more values than unknowns nothing is left over to judge errors by.
+    known = known._replace(
+        u=jnp.where(number > m * used.size + k, _certain(known.u), jnp.nan),
+        x=jnp.where((used > m)[:, None], _certain(known.x), jnp.nan),
+    )
 
     def kept(rows: list[Array], *size: int) -> Array:
         if not rows:
@@ -91,14 +97,18 @@ def _at_the_end(task: Task, seen: Seen, state: State) -> tuple[Spread, Array]:
     return known, known.cost + penalty_cost(task, seen, u, x)
 
 
+def _certain(uncertainty: Array) -> Array:
+    """NaN of what has no influence on the data, which is no certainty."""
+    return jnp.where(uncertainty > 0, uncertainty, jnp.nan)
+
+
 def _of_shapes(task: Task, u: Array, known: Spread) -> list[Array]:
     """Every shape parameter depends on one unknown, through the map onto its support."""
     unknowns = task.problem.unknowns
     slopes = jax.jacfwd(unknowns.shape)(u)
+    own = jnp.where(is_flat(unknowns.scales, u), jnp.nan, known.u)
     return [
-        jnp.abs(slopes[name][index]) * known.u[index]
-        if index >= 0
-        else jnp.asarray(jnp.nan)
+        jnp.abs(slopes[name][index]) * own[index] if index >= 0 else jnp.asarray(jnp.nan)
         for name, (index, _) in zip(
             unknowns.shape_names, unknowns.shape_source, strict=True
         )

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fitting.objectives import OBJECTIVES, ROBUST_WIDTH, transform
-from fitting.problem import NOISE_ROUNDS, assumed_noise
+from fitting.problem import NOISE_ROUNDS, TINY, assumed_noise
 from fitting.texels import many
 from fitting.texels.abreast import LARGEST, Data
 from fitting.texels.many import Found
@@ -40,7 +40,8 @@ def fit_chunk(
         data = data._replace(sigma=rows.sigma(rows.values))
     if objective.scaled:
         data = data._replace(unit=rows.unit())
-    parts = [*enumerate(tasks)] if len(tasks) > 1 else [(None, tasks[0])]
+    alone = options.per_channel_shape
+    parts = [*enumerate(tasks)] if alone else [(None, tasks[0])]
     found = [
         many.first(task, _of_channel(data, c), single_first=single_first)
         for c, task in parts
@@ -64,7 +65,8 @@ def fit_chunk(
         tasks = [with_residuals(t, robust=options.robust, penalised=True) for t in tasks]
         more = [many.penalties_of(t, data, f) for t, f in zip(tasks, found, strict=True)]
         once_more(data, tasks, np.flatnonzero(np.sum(more, axis=0) > 0))
-    return _joined(found)
+    each = [{**f.outcome._asdict(), "runner_up": f.runner_up} for f in found]
+    return _joined(each) if alone else each[0]
 
 
 class _Rows:
@@ -89,16 +91,19 @@ class _Rows:
         rows of the file."""
         values = self.values
         magnitude = np.abs(np.where(np.isfinite(fitted), fitted, values))
-        typical = _median(np.abs(values))[:, None, None]
+        size = np.abs(values)
+        count = np.maximum(np.sum(np.isfinite(size), axis=(1, 2)), 1)
+        mean = np.nansum(size, axis=(1, 2)) / count
+        median, mean = (v[:, None, None] for v in (_median(size), mean))
         out = np.ones(self._all.shape)
         noise = self._plan.options.noise
-        out[:, self._task.rows] = assumed_noise(magnitude, typical, noise)
+        out[:, self._task.rows] = assumed_noise(magnitude, median, mean, noise)
         return out
 
     def unit(self) -> np.ndarray:
         """1 over the median of the values times cosine, ``(t,)``."""
         median = _median(np.abs(self.values * self._kappa(None)))
-        return 1.0 / np.where(median > 0, median, 1.0)
+        return 1.0 / np.where(median > TINY, median, 1.0)
 
     def width(self, data: Data, fitted: np.ndarray) -> np.ndarray:
         """That of the robust residual, ``(t,)``; infinite where a fit leaves nothing."""
@@ -148,33 +153,23 @@ def _predicted(tasks: Sequence[Task], found: Sequence[Found]) -> np.ndarray:
     return np.concatenate(each, axis=2)
 
 
-def _joined(found: Sequence[Found]) -> dict[str, np.ndarray]:
-    """The fields of one outcome; of several, one per channel, those of the whole."""
-    each = [{**f.outcome._asdict(), "runner_up": f.runner_up} for f in found]
-    if len(each) == 1:
-        return each[0]
-    joined: dict[str, np.ndarray] = {}
-    for name in each[0]:
-        v = np.stack([e[name] for e in each], axis=-1)
-        joined[name] = _JOINED[name](v)
-    return joined
+def _joined(each: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """The fields of the whole from those of every channel.
 
-
-def _least(v: np.ndarray) -> np.ndarray:
-    least = np.min(np.where(np.isnan(v), np.inf, v), axis=-1)
-    return np.where(np.isfinite(least), least, np.nan)
-
-
-# Of fields whose last axis is that of the channels.
-_JOINED = {
-    "shape": np.asarray,
-    "shape_uncertainty": np.asarray,
-    "coefficients": lambda v: v[:, :, 0],
-    "coefficient_uncertainty": lambda v: v[:, :, 0],
-    "cost": lambda v: v.sum(axis=-1),
-    "converged": lambda v: v.all(axis=-1),
-    "steps": lambda v: v.max(axis=-1),
-    "used": lambda v: v.sum(axis=-1),
-    "as_promised": lambda v: v.all(axis=-1),
-    "runner_up": _least,
-}
+    Channels with too few values, whose cost is NaN, count for nothing.
+    """
+    whole = {n: np.stack([e[n] for e in each], axis=-1) for n in each[0]}
+    known = np.isfinite(whole["cost"])
+    cost = np.sum(whole["cost"], axis=-1, where=known)
+    runner_up = np.where(np.isnan(whole["runner_up"]), np.inf, whole["runner_up"])
+    least = np.min(runner_up, axis=-1)
+    return whole | {
+        "coefficients": whole["coefficients"][:, :, 0],
+        "coefficient_uncertainty": whole["coefficient_uncertainty"][:, :, 0],
+        "cost": np.where(known.any(axis=-1), cost, np.nan),
+        "converged": np.all(whole["converged"] | ~known, axis=-1) & known.any(axis=-1),
+        "steps": np.max(whole["steps"], axis=-1),
+        "used": np.sum(whole["used"], axis=-1),
+        "as_promised": np.all(whole["as_promised"], axis=-1),
+        "runner_up": np.where(np.isfinite(least), least, np.nan),
+    }

@@ -35,9 +35,13 @@ def scan(task: Task, seen: Seen, count: int) -> Starts:
     all. A cost is infinite where there is no further candidate.
     """
     exact = seen.values.dtype
+    heavy = linear_weights(task, seen)
+    if heavy.shape[0] > 1:
+        # Of no weight is the square out of range.
+        largest = jnp.max(heavy, axis=(1, 2), keepdims=True)
+        heavy = heavy / jnp.where(largest > 0, largest, 1.0)
     # Half the precision and time: what is found here is only where to begin.
-    task, seen = jax.tree.map(_single, (task, seen))
-    heavy, values = linear_weights(task, seen), seen.values
+    task, heavy, values = jax.tree.map(_single, (task, heavy, seen.values))
     quadratics = at_candidates(task, heavy, values)
     every = between.EVERY if task.even else 1
     points, shape = task.points[::every], (values.shape[1], values.shape[0])

@@ -11,7 +11,8 @@
 | `channel`, `wavelength` | (c,) | names; nm, if known |
 
 with (h, w) instead of (t) where the data have it. Attributes: `model`, `objective`,
-`settings_json`, `versions_json`, `source`, and `units` of every parameter.
+`settings_json`, `versions_json`, `source`, `unseen_json`: sentences on parameters that are
+held because no direction sees them; and `units` of every parameter.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from data_formats import Channel, Measurement
+from data_formats import Channel, Measurement, MeasurementError
 from fitting import problem as problems
 from fitting.expression import ModelError
 from fitting.model import Model
@@ -21,6 +21,7 @@ from fitting.reduced import Problem, amplitudes
 from fitting.rows import Rows, select_rows, weighted
 from fitting.starts import candidates
 from fitting.texels.box import Box, make_box
+from fitting.unseen import without_unseen
 
 # So that reductions over rows have no remainder.
 _ROWS_AT_ONCE = 8
@@ -75,10 +76,14 @@ class Task(eqx.Module):
 @dataclass(frozen=True)
 class Plan:
     """The tasks of texels, one per channel where each has its own shape, and the options,
-    whose objective is settled."""
+    whose objective is settled.
+
+    ``unseen`` are sentences on what no row sees and is therefore held.
+    """
 
     tasks: list[Task]
     options: FitOptions
+    unseen: list[str]
 
     @property
     def takes_sigma(self) -> bool:
@@ -123,16 +128,18 @@ def make_plan(
     Raises `ModelError` for options that are not for texels and `MeasurementError` if no
     row is left. Call with x64 enabled.
     """
+    objective = problems.resolve_objective(options.objective, with_sigma)
+    options = dataclasses.replace(options, objective=objective)
     check_options(options)
     measurement = _stand_in(angles, channels)
     rows = select_rows(measurement, options.max_theta_deg, model.ways)
     if isinstance(options.weights, np.ndarray):
         rows = weighted(rows, options.weights)
-    objective = problems.resolve_objective(options.objective, with_sigma)
-    options = dataclasses.replace(options, objective=objective)
+    options, unseen = without_unseen(rows, model, options)
     # Each texel has standard uncertainties of its own.
     problem = problems.prepare(rows, model, dataclasses.replace(options, noise=None))
     n = rows.index.size
+    _check_number(n, 1 if options.per_channel_shape else channels, problem)
     problem = _first_rows(problem, -(-n // _ROWS_AT_ONCE) * _ROWS_AT_ONCE)
     problem = dataclasses.replace(
         problem,
@@ -144,12 +151,23 @@ def make_plan(
         problem = dataclasses.replace(problem, kappa=jnp.abs(problem.geometry.cos_o))
     if options.per_channel_shape:
         each = [problems.for_channel(problem, c) for c in range(channels)]
-        return Plan([_task(p, rows) for p in each], options)
+        return Plan([_task(p, rows) for p in each], options, unseen)
     if problem.unknowns.spectral:
         raise ModelError(
             "texels take one value for all channels of a shape parameter that is fixed"
         )
-    return Plan([_task(problem, rows)], options)
+    return Plan([_task(problem, rows)], options, unseen)
+
+
+def _check_number(n: int, channels: int, problem: Problem) -> None:
+    """Raises `MeasurementError` where no texel can have enough values."""
+    m, k = problem.unknowns.n_coefficients, problem.unknowns.n_shape
+    least = m + -(-k // channels)
+    if n < least:
+        raise MeasurementError(
+            f"{n} of the directions can be used; expected {least} or more for "
+            f"{problem.model.expression}"
+        )
 
 
 def _task(problem: Problem, rows: Rows) -> Task:

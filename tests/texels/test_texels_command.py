@@ -130,6 +130,8 @@ def test_a_shape_per_channel_and_other_residuals(tmp_path, monkeypatch):
         ("nothing", ["--noise", "0.1"], 2, "expected two numbers A,B"),
         ("nothing", ["--noise", "0.1,0"], 2, "with the objective chi2"),
         ("nothing", ["--energy", "-1"], 2, "a number from 0 on"),
+        ("nothing", ["--energy", "nan"], 2, "a number from 0 on"),
+        ("nothing", ["--max-theta", "1"], 3, "directions can be used; expected 4"),
         ("nothing", ["--workers", "0"], 2, "from 1 on"),
         ("nothing", ["--max-theta", "95"], 2, "0 to 90"),
         ("nothing", ["--fix", "ggx.beta=1"], 2, "no parameter 'ggx.beta'"),

@@ -174,6 +174,69 @@ def test_lobes_that_are_not_reciprocal_are_penalised_as_in_fit(monkeypatch):
     assert_agrees(found, 1, single)
 
 
+@pytest.mark.slow
+def test_channels_without_light_and_noise_without_a_floor():
+    """Everything 0 in a channel, half of the values 0, all of them 0, tiny, denormal."""
+    texels = np.stack([sample_of_one()] * 5)
+    texels[0, :, 0] = 0.0
+    texels[1][np.random.default_rng(0).random((60, 3)) < 0.6] = 0.0
+    texels[2] = 0.0
+    texels[3] *= 1e-30
+    texels[4, ::2] = 1e-310
+    settings = {"objective": "chi2", "noise": (0.02, 0.0)}
+    found = fit_many(texels, ANGLES, MODEL, **settings)
+    assert found.converged.all()
+    assert (found.used == 180).all()
+    assert np.isnan(found.uncertainties["ggx.alpha"][2])
+    single = one_by_one(texels[0], MODEL, **settings)
+    assert single.solver.converged
+    assert found.cost[0] == pytest.approx(single.solver.cost, rel=1e-6)
+    for objective in ("asinh", "cbrt"):
+        assert fit_many(texels, ANGLES, MODEL, objective=objective).converged.all()
+
+
+def sample_of_one() -> np.ndarray:
+    clean = texel_samples.values_of(MODEL, texel_samples.truth(1), ANGLES)
+    return texel_samples.noisy(clean)[0]
+
+
+def test_a_shape_at_its_bound_has_no_uncertainty(sample):
+    settings = {"objective": "l2cos", "bounds": {"ggx.alpha": (0.1, 0.2)}}
+    found = fit_many(sample[:6], ANGLES, MODEL, **settings)
+    wide = fit_many(sample[:6], ANGLES, MODEL).parameters["ggx.alpha"]
+    outside = (wide < 0.1) | (wide > 0.2)
+    assert 0 < outside.sum() < 6
+    np.testing.assert_array_equal(np.isnan(found.uncertainties["ggx.alpha"]), outside)
+
+
+@pytest.mark.slow
+def test_a_channel_that_is_not_known_leaves_the_others_alone(sample):
+    values = sample[:3].copy()
+    values[1, :, 1] = np.nan
+    found = fit_many(values, ANGLES, MODEL, per_channel_shape=True)
+    whole = fit_many(sample[:3], ANGLES, MODEL, per_channel_shape=True)
+    assert found.converged.all()
+    alpha = found.parameters["ggx.alpha"]
+    assert np.isnan(alpha[1]).tolist() == [False, True, False]
+    np.testing.assert_array_equal(alpha[:, ::2], whole.parameters["ggx.alpha"][:, ::2])
+    assert found.cost[1] < whole.cost[1]
+    one = fit_many(sample[:3, :, :1], ANGLES, MODEL, per_channel_shape=True)
+    np.testing.assert_array_equal(one.parameters["ggx.alpha"], alpha[:, :1])
+
+
+@pytest.mark.slow
+def test_what_no_direction_sees_is_held_as_in_fit(sample):
+    found = fit_many(sample[:2], ANGLES, "rough_dielectric")
+    assert (found.parameters["rough_dielectric.transmitted"] == 1.0).all()
+
+
+@pytest.mark.slow
+def test_an_angle_is_told_within_its_period(sample):
+    found = fit_many(sample[:8], ANGLES, "lambert + ggx(aniso)")
+    angle = found.parameters["ggx.angle"]
+    assert np.all((angle >= 0) & (angle < np.pi))
+
+
 def test_weights_of_rows_count_as_in_fit(sample):
     weights = np.random.default_rng(0).uniform(0.0, 2.0, 60)
     found = fit_many(sample[:3], ANGLES, MODEL, weights=weights)
@@ -345,6 +408,7 @@ def test_single_precision_first_ends_at_the_same(sample):
         ({"noise": (0.1, 0.0)}, ModelError, "go together: give both or neither"),
         ({"energy": "hard"}, ModelError, "found 'hard'"),
         ({"material": {"ggx": "Au"}}, ModelError, "no material"),
+        ({"max_theta_deg": 1.0}, MeasurementError, "directions can be used; expected 4"),
         ({"colour": True}, ModelError, "no option colour"),
         ({"model": "lambert + gxx"}, ModelError, "did you mean 'ggx'"),
     ],
