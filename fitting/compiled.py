@@ -33,6 +33,10 @@ _QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level"
 # good, small ones included, and where they are used up the compiler aborts.
 _MANY = 30_000
 _REGIONS = Path("/proc/self/maps")
+# Of the names of functions that are kept, and of no others: lest one comes out of JAX's own
+# cache, where a function of the same code may be. What was read there cannot be written
+# again.
+_KEPT = "_kept"
 
 
 def compiled(
@@ -115,12 +119,14 @@ class Compiled(Generic[_P, _T]):
         program = None if described is None else kept_programs.read(described)
         if program is not None:
             return _joined(program)
-        jitted, arrays = self._jitted(tree, leaves), [v for v in leaves if _is_array(v)]
-        if described is not None:
-            program = kept_programs.made(described, jitted, arrays)
+        if described is None:
+            return self._jitted(tree, leaves)
+        jitted = self._jitted(tree, leaves, name=self._function.__name__ + _KEPT)
+        arrays = [v for v in leaves if _is_array(v)]
+        program = kept_programs.made(described, jitted, arrays)
         return jitted if program is None else _joined(program)
 
-    def _jitted(self, tree: Any, leaves: list[Any]) -> Any:
+    def _jitted(self, tree: Any, leaves: list[Any], name: str | None = None) -> Any:
         """The function of its arrays, in order; the rest of the arguments is fixed."""
         is_array = [_is_array(v) for v in leaves]
         fixed = [None if array else v for array, v in zip(is_array, leaves, strict=True)]
@@ -133,10 +139,7 @@ class Compiled(Generic[_P, _T]):
             )
             return self._function(*args, **kwargs)
 
-        # Under another name, lest one that is to be kept comes out of JAX's own cache: what
-        # was read there cannot be written again.
-        keeps = kept_programs.folder() is not None
-        flat.__name__ = self._function.__name__ + ("_kept" if keeps else "")
+        flat.__name__ = name or self._function.__name__
         return jax.jit(flat, compiler_options=_known(self._wishes(leaves)))
 
     def _wishes(self, leaves: list[Any]) -> dict[str, Any]:

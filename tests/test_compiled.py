@@ -153,8 +153,9 @@ def test_zero_has_a_sign():
     assert function(np.ones(1), -0.0)[0] == -1
 
 
-def test_what_jax_has_kept_is_not_kept_again(folder, monkeypatch, tmp_path_factory):
-    """A program that JAX read from its own cache cannot be written any more."""
+@pytest.fixture
+def jax_keeps_all(tmp_path_factory):
+    """JAX's own cache, empty at first, keeps whatever is compiled."""
     settings = {
         "jax_compilation_cache_dir": str(tmp_path_factory.mktemp("jax")),
         "jax_persistent_cache_min_compile_time_secs": 0.0,
@@ -163,16 +164,38 @@ def test_what_jax_has_kept_is_not_kept_again(folder, monkeypatch, tmp_path_facto
     compilation_cache.reset_cache()
     for name, value in settings.items():
         jax.config.update(name, value)
-    try:
-        for kept in (None, folder, None, folder, folder):
-            monkeypatch.setattr(kept_programs, "_folder", kept)
-            jax.clear_caches()
-            out = Compiled(Counted(), None)(np.ones(2), np.ones(2), "+")
-            np.testing.assert_array_equal(out, [2, 2])
-    finally:
-        for name, value in before.items():
-            jax.config.update(name, value)
-        compilation_cache.reset_cache()
+    yield
+    for name, value in before.items():
+        jax.config.update(name, value)
+    compilation_cache.reset_cache()
+
+
+@pytest.mark.usefixtures("jax_keeps_all")
+def test_what_jax_has_kept_is_not_kept_again(folder, monkeypatch):
+    """A program that JAX read from its own cache cannot be written any more."""
+    for kept in (None, folder, None, folder, folder):
+        monkeypatch.setattr(kept_programs, "_folder", kept)
+        jax.clear_caches()
+        out = Compiled(Counted(), None)(np.ones(2), np.ones(2), "+")
+        np.testing.assert_array_equal(out, [2, 2])
+
+
+@pytest.mark.usefixtures("jax_keeps_all")
+def test_what_was_compiled_for_others_is_not_kept(folder):
+    """Nor one with the same code as what is not kept, or was only looked into."""
+
+    def run(own: object) -> None:
+        jax.clear_caches()
+        out = Compiled(Counted(lambda own, a: jnp.pad(a + a, 3)), None)(own, np.ones(2))
+        np.testing.assert_array_equal(out, [0, 0, 0, 2, 2, 0, 0, 0])
+
+    run(Somebodys())
+    looked_into = Compiled(Counted(lambda own, a: jnp.pad(a + a, 3)), None)
+    looked_into.lower((), np.ones(2)).compile()
+    assert not _files(folder)
+    for _ in range(3):
+        run(())
+    assert len(_files(folder)) == 1
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "another"])
