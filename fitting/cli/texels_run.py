@@ -113,15 +113,11 @@ def settle(file: Path, choices: TexelChoices, who: TexelWork) -> TexelJob:
     import jax
 
     from fitting.model import Model
-    from fitting.texels.fits import lines_per_chunk, texel_options
-    from fitting.texels.task import make_plan
+    from fitting.texels.fits import lines_per_chunk, plan_of
 
     model = Model(choices.model)
     with jax.enable_x64(True):
-        plan = make_plan(
-            source.directions, source.shape[-1], model, texel_options(settings),
-            with_sigma=source.has_sigma,
-        )  # fmt: skip
+        plan = plan_of(source, model, settings)
     lines = lines_per_chunk(source.shape)
     state = file.stat()
     recipe = {

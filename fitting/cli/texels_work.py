@@ -60,14 +60,9 @@ def settings_of(recipe: str) -> tuple[str, dict[str, Any]]:
 def _common(path: Path, recipe: str):
     """The file and the plan, once per process. Call with x64 enabled."""
     from fitting.model import Model
-    from fitting.texels.fits import texel_options
+    from fitting.texels.fits import plan_of
     from fitting.texels.source import open_source
-    from fitting.texels.task import make_plan
 
     model, settings = settings_of(recipe)
     source = open_source(path)
-    plan = make_plan(
-        source.directions, source.shape[-1], Model(model), texel_options(settings),
-        with_sigma=source.has_sigma,
-    )  # fmt: skip
-    return source, plan
+    return source, plan_of(source, Model(model), settings)

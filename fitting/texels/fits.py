@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
@@ -19,6 +19,9 @@ from fitting.problem import resolve_objective
 from fitting.texels.abreast import lanes
 from fitting.texels.rounds import fit_chunk
 from fitting.texels.task import Plan, make_plan
+
+if TYPE_CHECKING:
+    from fitting.texels.source import Source
 
 # Of measured values in one chunk, and the most texels: what is in memory at a time.
 _CHUNK_BYTES = 48_000_000
@@ -112,6 +115,14 @@ def fit_many(
                 progress(min(first + lines, leading[0]) * math.prod(leading[1:]))
     whole = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
     return _named(plan, whole, leading)
+
+
+def plan_of(source: Source, model: Model, settings: Mapping[str, Any]) -> Plan:
+    """The plan for a file. Raises as `make_plan`; call with x64 enabled."""
+    return make_plan(
+        source.directions, source.shape[-1], model, texel_options(settings),
+        with_sigma=source.has_sigma,
+    )  # fmt: skip
 
 
 def lines_per_chunk(shape: tuple[int, ...]) -> int:

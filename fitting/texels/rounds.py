@@ -7,6 +7,7 @@ at the ends of the one before.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -70,19 +71,16 @@ def fit_chunk(
 
 
 class _Rows:
-    """The rows of a chunk that are used, as what belongs to a texel as a whole sees them.
-
-    Written when it is first needed, which it is mostly not.
-    """
+    """The rows of a chunk that are used, for what belongs to a texel as a whole."""
 
     def __init__(self, plan: Plan, values: np.ndarray):
         self._plan, self._all = plan, values
         self._task, self._objective = plan.tasks[0], plan.options.objective
         self._n = self._task.rows.size
 
-    @property
+    @functools.cached_property
     def values(self) -> np.ndarray:
-        """``(t, n, c)``, NaN where unknown."""
+        """``(t, n, c)``, NaN where unknown; made when first needed, mostly never."""
         used = self._all[:, self._task.rows].astype(np.float64)
         return np.where(np.abs(used) < LARGEST, used, np.nan)
 
