@@ -13,6 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
+from uuid import uuid4
 
 import equinox as eqx
 import jax
@@ -33,10 +34,6 @@ _QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level"
 # good, small ones included, and where they are used up the compiler aborts.
 _MANY = 30_000
 _REGIONS = Path("/proc/self/maps")
-# Of the names of functions that are kept, and of no others: lest one comes out of JAX's own
-# cache, where a function of the same code may be. What was read there cannot be written
-# again.
-_KEPT = "_kept"
 
 
 def compiled(
@@ -116,15 +113,41 @@ class Compiled(Generic[_P, _T]):
             return self._jitted(tree, leaves)
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         described = kept_programs.description(name, self._wishes(leaves), tree, kinds)
-        program = None if described is None else kept_programs.read(described)
-        if program is not None:
-            return _joined(program)
         if described is None:
             return self._jitted(tree, leaves)
-        jitted = self._jitted(tree, leaves, name=self._function.__name__ + _KEPT)
+        program = kept_programs.read(described)
+        if program is not None:
+            return self._or_made_again(program, described, key, leaves)
+        return self._made_and_kept(described, tree, leaves)
+
+    def _made_and_kept(
+        self, described: str, tree: Any, leaves: list[Any]
+    ) -> Callable[..., Any]:
+        # JAX's own cache finds functions by name and code: it is never to find this one,
+        # since what was read there cannot be written again.
+        jitted = self._jitted(tree, leaves, name=f"{self._function.__name__}_{uuid4().hex}")
         arrays = [v for v in leaves if _is_array(v)]
         program = kept_programs.made(described, jitted, arrays)
         return jitted if program is None else _joined(program)
+
+    def _or_made_again(
+        self, program: Program, described: str, key: tuple, leaves: list[Any]
+    ) -> Callable[..., Any]:
+        """What was read, or made anew if it turns out that it cannot be run."""
+        read = _joined(program)
+        others = [None if _is_array(v) else [v] for v in leaves]
+
+        def run(*arrays: Any) -> Any:
+            try:
+                return read(*arrays)
+            except jax.errors.JaxRuntimeError:
+                given = iter(arrays)
+                all_of_them = [next(given) if v is None else v[0] for v in others]
+                made = self._made_and_kept(described, key[0], all_of_them)
+                self._ready[key] = made
+                return made(*arrays)
+
+        return run
 
     def _jitted(self, tree: Any, leaves: list[Any], name: str | None = None) -> Any:
         """The function of its arrays, in order; the rest of the arguments is fixed."""

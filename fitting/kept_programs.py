@@ -124,7 +124,7 @@ def _path(described: str) -> Path:
 
 
 class _NotInJaxCache:
-    """What is kept here is not kept by JAX too, which could not be read and kept again.
+    """What is kept here is not kept by JAX too, where nobody would look for it.
 
     The setting is one for all threads: the first in makes it, the last out undoes it.
     """

@@ -29,6 +29,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
     for name, value in haste.kept_in(config.rootpath).items():
         jax.config.update(name, value)
+    # Commands in this process keep nothing: what is compiled in haste is not the user's.
+    os.environ["BRDF_CACHE_DIR"] = ""
 
 
 def pytest_collection_finish() -> None:

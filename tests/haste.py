@@ -72,4 +72,5 @@ def environment(root: Path) -> dict[str, str]:
     """The variables that make another process compile as quickly, and keep it."""
     flags = (f"--{name}={str(value).lower()}" for name, value in options().items())
     kept = {name.upper(): str(value) for name, value in kept_in(root).items()}
-    return {"XLA_FLAGS": " ".join(flags), **kept}
+    ours = {"BRDF_CACHE_DIR": kept["JAX_COMPILATION_CACHE_DIR"]}
+    return {"XLA_FLAGS": " ".join(flags), **kept, **ours}

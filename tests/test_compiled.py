@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import synthetic
+from jax.experimental import serialize_executable
 from jax.experimental.compilation_cache import compilation_cache
 
 from fitting import Model, fit, from_angles, kept_programs
@@ -196,6 +198,30 @@ def test_what_was_compiled_for_others_is_not_kept(folder):
     for _ in range(3):
         run(())
     assert len(_files(folder)) == 1
+
+
+@pytest.mark.usefixtures("jax_keeps_all")
+def test_what_cannot_be_run_is_made_again(folder):
+    """A program as a version of this package wrote it that took it from JAX's cache."""
+
+    def padded(a):
+        return jnp.pad(a + a, 3)
+
+    for _ in range(2):
+        jax.clear_caches()
+        from_jax = jax.jit(padded).lower(np.ones(2)).compile()
+    payload, *_ = serialize_executable.serialize(from_jax)
+    Compiled(Counted(padded), None)(np.ones(2))
+    (path,) = _files(folder)
+    head, _, _ = zlib.decompress(path.read_bytes()).partition(b"\n")
+    path.write_bytes(zlib.compress(head + b"\n" + payload))
+    jax.clear_caches()
+    for traced in (1, 0):
+        counted = Counted(padded)
+        again = Compiled(counted, None)
+        for _ in range(2):
+            np.testing.assert_array_equal(again(np.ones(2)), [0, 0, 0, 2, 2, 0, 0, 0])
+        assert counted.traced == traced
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "another"])

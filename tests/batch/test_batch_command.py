@@ -127,7 +127,6 @@ def run_again(
     """The same command once more, in this process: there is little to do."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(done.folder)
-        patch.setenv("BRDF_CACHE_DIR", "")
         code = main(["batch", "?/*", "y.astm", *OPTIONS, "--workers", "0", *argv])
     said = capfd.readouterr()
     return code, said.out + said.err
@@ -188,7 +187,6 @@ def test_senseless_commands_end_in_a_sentence_and_leave_nothing(
     argv: list[str], says: str, tmp_path: Path, monkeypatch, capfd
 ):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("BRDF_CACHE_DIR", "")
     write_paint(tmp_path / "p.astm", 0)
     workers = [] if "--workers" in argv else ["--workers", "0"]
     assert main(["batch", *argv, *workers]) == 2

@@ -14,9 +14,8 @@ from fitting.comparison import Comparison
 
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Runs a command in an empty folder, without a cache on disk."""
+    """Runs a command in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("BRDF_CACHE_DIR", "")
     monkeypatch.setenv("COLUMNS", "100")
     return invoke
 
@@ -46,7 +45,6 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Fitted:
     folder = tmp_path_factory.mktemp("fitted")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setenv("BRDF_CACHE_DIR", "")
         patch.setenv("COLUMNS", "100")
         patch.setattr(fit_run, "run", spy)
         outcome = invoke("fit", "-m", "lambert", "-m", "lambert+ggx")

@@ -18,7 +18,6 @@ from fitting.export import TARGETS
 def run(tmp_path, monkeypatch, capsys):
     """Runs a command in a folder that holds ``paint.fit.json``."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("BRDF_CACHE_DIR", "")
     monkeypatch.setenv("COLUMNS", "100")
     result = result_of("lambert", SPECTRAL, lambert__albedo=np.linspace(0.2, 0.4, 6))
     result.save(tmp_path / "paint.fit.json")

@@ -23,7 +23,6 @@ from fitting.result import load_result
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("BRDF_CACHE_DIR", "")
     monkeypatch.setenv("COLUMNS", "120")
 
     def invoke(*argv: object) -> tuple[int, str, str]:

@@ -23,7 +23,6 @@ from fitting.sample import sample_path
 def run(kept, other, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Runs the command in a folder with two results; with few figures."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("BRDF_CACHE_DIR", "")
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setattr("fitting.report.figures.FIRST", ("starts",))
     monkeypatch.setattr("fitting.report.figures.MORE", ())

@@ -267,7 +267,6 @@ def test_what_a_file_says_of_itself_is_cited(kept, data, no_figures):
 )  # fmt: skip
 def test_the_command_makes_the_same_fit_again(options, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("BRDF_CACHE_DIR", "")
     assert main(["fit", *options, "-o", "a.fit.json", "-q"]) == 0
     first = load_result("a.fit.json")
     words = shlex.split(command(first))

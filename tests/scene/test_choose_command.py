@@ -70,7 +70,6 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setenv("BRDF_CACHE_DIR", "")
         patch.setenv("COLUMNS", "100")
         patch.setattr(chooser, "choose_for_scene", spy)
         Path("tiny.toml").write_text(SCENE)
@@ -83,7 +82,6 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Runs a command in a folder with nothing but the scene."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("BRDF_CACHE_DIR", "")
     monkeypatch.setenv("COLUMNS", "100")
     Path("tiny.toml").write_text(SCENE)
     return invoke

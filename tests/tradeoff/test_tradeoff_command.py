@@ -23,7 +23,6 @@ def done(tmp_path_factory) -> tuple[Outcome, Path]:
     folder = tmp_path_factory.mktemp("tradeoff")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setenv("BRDF_CACHE_DIR", "")
         patch.setenv("COLUMNS", "100")
         outcome = invoke(
             "tradeoff", *MODELS, *PLAIN, "-o", "t.json", "--figure", "t.svg", "-v"
@@ -35,7 +34,6 @@ def done(tmp_path_factory) -> tuple[Outcome, Path]:
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("BRDF_CACHE_DIR", "")
     monkeypatch.setenv("COLUMNS", "100")
     return tmp_path
 
