@@ -136,8 +136,8 @@ def propose(
     def coefficients(step: Array) -> tuple[Array, Array]:
         pull = qp.product(damped, x) - b.g_x
         pull = pull - jnp.einsum("cmk,k->cm", b.h_xu, step)
-        free = qp.solve(damped, pull, unknowns.rows, unknowns.limits)
-        return free.x - x, jnp.einsum("cmn,cnk->cmk", free.inverse, b.h_xu)
+        best, inverse = unknowns.best(damped, pull, x)
+        return best - x, jnp.einsum("cmn,cnk->cmk", inverse, b.h_xu)
 
     def shape_step(x_step: Array, response: Array) -> tuple[Array, Array]:
         schur = b.h_uu - jnp.einsum("cmk,cml->kl", b.h_xu, response)

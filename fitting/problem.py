@@ -238,6 +238,8 @@ def for_channel(problem: Problem, c: int) -> Problem:
         problem.unknowns,
         coefficient_constant=problem.unknowns.coefficient_constant[:, c : c + 1],
         shape_constant=fixed[:, c : c + 1] if problem.unknowns.spectral else fixed,
+        low=problem.unknowns.low[c : c + 1],
+        high=problem.unknowns.high[c : c + 1],
         limits=problem.unknowns.limits[c : c + 1],
     )
     weight, target = row(problem.weight), row(problem.target)

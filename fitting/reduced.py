@@ -29,7 +29,8 @@ class Unknowns(eqx.Module):
 
     Parameter ``p`` is ``factor * free[index] + constant``; ``index`` is -1 if it is fixed.
     ``shape_constant`` has one column, or one per channel where a fixed shape parameter is
-    spectral; then the basis functions are too.
+    spectral; then the basis functions are too. Free coefficients lie within ``low`` and
+    ``high``; ``rows x >= limits`` says the same, and more unless there are ``only_bounds``.
     """
 
     shape_names: tuple[str, ...] = eqx.field(static=True)
@@ -42,6 +43,9 @@ class Unknowns(eqx.Module):
     lower: Float[Array, " k"]
     upper: Float[Array, " k"]
     coefficient_constant: Float[Array, "q c"]
+    low: Float[Array, "c m"]
+    high: Float[Array, "c m"]
+    only_bounds: bool = eqx.field(static=True)
     rows: Float[Array, "p m"]
     limits: Float[Array, "c p"]
 
@@ -91,6 +95,24 @@ class Unknowns(eqx.Module):
                 zip(self.coefficient_names, self.coefficient_source, strict=True)
             )
         }
+
+    def best(
+        self, hessian: Array, linear: Array, near: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Minimisers ``(p c, m)`` of ``x' H x / 2 - b' x`` for ``p`` times all channels,
+        and inverses of ``H (p c, m, m)`` on what no constraint holds.
+
+        ``near`` is a guess, which may save time.
+        """
+        times = linear.shape[0] // self.low.shape[0]
+
+        def each(v: Array) -> Array:
+            return v if times == 1 else jnp.tile(v, (times, 1))
+
+        if self.only_bounds:
+            return qp.within(hessian, linear, each(self.low), each(self.high), near)
+        found = qp.solve(hessian, linear, self.rows, each(self.limits))
+        return found.x, found.inverse
 
 
 def _masters(
@@ -187,8 +209,7 @@ def evaluate(problem: Problem, u: Array, x: Array) -> Blocks:
         to_x = jnp.pad(da_dx, ((0, 0), (0, n_features - n_basis), (0, 0)))
         h = jnp.einsum("cfm,cfg,cgn->cmn", to_x, gram, to_x)
         g = jnp.einsum("cfm,cf->cm", to_x, gradient)
-        unknowns = problem.unknowns
-        best = qp.solve(h, qp.product(h, x) - g, unknowns.rows, unknowns.limits).x
+        best, _ = problem.unknowns.best(h, qp.product(h, x) - g, x)
         step = qp.product(to_x, best - x)
         change = qp.product(gram, step)
         cost = cost + jnp.sum((2.0 * gradient + change) * step)

@@ -230,18 +230,17 @@ def visible_width(
     for a lobe without a peak, where no row lies beyond, or if it is more than ``widest``.
     ``bright`` is the problem's `brightness`.
     """
-    own = {n: jax.device_put(v) for n, v in shape.items()}
-    peak = peak_of(lobe, own)
+    peak = peak_of(lobe, shape)
     if peak is None:
         return None
-    geometry = jax.tree.map(np.asarray, problem.geometry)
+    own = {n: np.asarray(v) for n, v in shape.items()}
 
     def located(rows: slice | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        g = jax.tree.map(lambda a: a[rows], geometry)
+        g = jax.tree.map(lambda a: np.asarray(a)[rows], problem.geometry)
         if isinstance(peak, AxisPeak):
             slope = axis_slopes(_towards(g, lobe)[0], peak)
         else:
-            slope = np.hypot(*facet_slopes(g, lobe, own))
+            slope = np.hypot(*facet_slopes(g, lobe, own))  # pyright: ignore
         return np.asarray(g.on(lobe.ways)), slope
 
     # Few data are narrow, which a few of the brightest rows tell.

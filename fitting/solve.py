@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -11,6 +12,9 @@ from jaxtyping import Array, Bool, Float, Int
 from fitting import qp, reduced, row_sums
 from fitting.compiled import compiled
 from fitting.reduced import Blocks, Problem
+
+# Values of basis functions.
+_MANY = 4_000_000
 
 
 class Solution(NamedTuple):
@@ -61,16 +65,19 @@ def scan(
         curvature = jnp.einsum("cbm,cbd,cdn->cmn", da_dx, gram, da_dx)
         return curvature, slope, square + jnp.sum(a * (here - 2.0 * moment))
 
-    curvature, slope, cost = jax.lax.map(moments, candidates)
+    # Loops leave other cores idle, and may not write all basis functions at once.
+    size = candidates.shape[0] * problem.kappa.size * max(1, row_sums.n_basis(problem))
+    alike = len(problem.linear_weight) == 1 and not unknowns.spectral
+    each = jax.vmap(moments) if alike and size <= _MANY else partial(jax.lax.map, moments)
+    curvature, slope, cost = each(candidates)
     finite = jnp.isfinite(cost)
     if m:
         # All at once, which no shape may spoil for the others.
         finite &= jnp.all(jnp.isfinite(curvature), axis=(1, 2, 3))
         h = jnp.where(finite[:, None, None, None], curvature, jnp.eye(m))
         g = jnp.where(finite[:, None, None], slope, 0.0)
-        limits = jnp.tile(unknowns.limits, (cost.shape[0], 1))
-        pull = -g.reshape(-1, m)
-        x = qp.solve(h.reshape(-1, m, m), pull, unknowns.rows, limits).x.reshape(g.shape)
+        x, _ = unknowns.best(h.reshape(-1, m, m), -g.reshape(-1, m))
+        x = x.reshape(g.shape)
         cost = cost + jnp.sum((2.0 * g + qp.product(h, x)) * x, axis=(1, 2))
     else:
         x = jnp.zeros_like(slope)

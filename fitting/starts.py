@@ -191,11 +191,13 @@ def thinned(problem: Problem, bright: np.ndarray) -> Problem:
     n = problem.kappa.shape[0]
     if n <= _SCAN_ROWS:
         return problem
-    order = np.argpartition(-bright, _BRIGHT_ROWS)
+    brightest = np.sort(_brightest(bright, _BRIGHT_ROWS))
     drawn = _SCAN_ROWS - _BRIGHT_ROWS
     rng = np.random.default_rng(0)
     others = np.sort(rng.choice(n - _BRIGHT_ROWS, drawn, replace=False, shuffle=False))
-    rows = np.concatenate([order[:_BRIGHT_ROWS], order[_BRIGHT_ROWS + others]])
+    # Of the rows that are left; so many of the brightest come before.
+    others += np.searchsorted(brightest - np.arange(_BRIGHT_ROWS), others, side="right")
+    rows = np.concatenate([brightest, others])
     stands_for = np.ones(_SCAN_ROWS)
     stands_for[_BRIGHT_ROWS:] = np.sqrt((n - _BRIGHT_ROWS) / drawn)
 
@@ -216,3 +218,13 @@ def thinned(problem: Problem, bright: np.ndarray) -> Problem:
         weight=take(problem.weight) * stands_for,
         linear_weight=take(problem.linear_weight) * stands_for,
     )
+
+
+def _brightest(bright: np.ndarray, count: int) -> np.ndarray:
+    """The rows with the ``count`` largest values, in any order."""
+    # The largest values of as many parts: there are that many rows not below the least.
+    parts = bright[: bright.size // count * count].reshape(-1, count)
+    rows = np.flatnonzero(bright >= np.min(np.max(parts, axis=0)))
+    if rows.size > count:
+        rows = rows[np.argpartition(-bright[rows], count)[:count]]
+    return rows

@@ -77,9 +77,11 @@ def make_unknowns(model: Model, n_channels: int, options: FitOptions) -> Unknown
     for i, name in enumerate(linear_names):
         if name in fixed:
             constant[i] = fixed[name]
+    ends = [_ends(n, bounds.get(n), declared[n]) for n in linear_free]
     rows, limits = _constraints(
-        model, linear_free, linear_names, linear_source, constant, bounds, options
+        model, linear_free, linear_names, linear_source, constant, ends, options
     )
+    low, high = np.array(ends, dtype=np.float64).reshape(-1, 2).T
     put = jax.device_put
     return Unknowns(
         shape_names=tuple(shape_names),
@@ -92,6 +94,9 @@ def make_unknowns(model: Model, n_channels: int, options: FitOptions) -> Unknown
         lower=put(np.array([low for low, _ in supports], dtype=np.float64)),
         upper=put(np.array([high for _, high in supports], dtype=np.float64)),
         coefficient_constant=put(constant),
+        low=put(np.tile(low, (n_channels, 1))),
+        high=put(np.tile(high, (n_channels, 1))),
+        only_bounds=options.energy != "hard",
         rows=put(rows),
         limits=put(limits),
     )
@@ -166,11 +171,16 @@ def _support(
     return low, high
 
 
-def _ends(bound: tuple[float, float] | None, parameter: Parameter) -> tuple[float, float]:
+def _ends(
+    name: str, bound: tuple[float, float] | None, parameter: Parameter
+) -> tuple[float, float]:
     """Bounds of a coefficient; an infinite end stands for that of the support."""
     low, high = bound or parameter.support
     low = low if math.isfinite(low) else parameter.support[0]
-    return low, high if math.isfinite(high) else parameter.support[1]
+    high = high if math.isfinite(high) else parameter.support[1]
+    if not low < high:
+        raise ModelError(f"bounds ({low:g}, {high:g}) of {name}: expected low < high")
+    return low, high
 
 
 def _constraints(
@@ -179,18 +189,14 @@ def _constraints(
     names: list[str],
     source: tuple[tuple[int, float], ...],
     constant: np.ndarray,
-    bounds: dict[str, tuple[float, float]],
+    ends: list[tuple[float, float]],
     options: FitOptions,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows and limits of ``rows x >= limits``: bounds, and energy where it is hard."""
-    declared = model.parameters()
     rows: list[np.ndarray] = []
     limits: list[np.ndarray] = []
     ones = np.ones(constant.shape[1])
-    for k, name in enumerate(free):
-        low, high = _ends(bounds.get(name), declared[name])
-        if not low < high:
-            raise ModelError(f"bounds ({low:g}, {high:g}) of {name}: expected low < high")
+    for k, (low, high) in enumerate(ends):
         unit = np.zeros(len(free))
         unit[k] = 1.0
         if math.isfinite(low):
@@ -201,14 +207,13 @@ def _constraints(
             limits.append(-high * ones)
     if options.energy == "hard":
         sources = dict(zip(names, zip(source, constant, strict=True), strict=True))
-        lows = [_ends(bounds.get(n), declared[n])[0] for n in free]
         for choice in _albedo_bounds(model, names):
             row, limit, least = np.zeros(len(free)), -ones, 0.0 * ones
             for name, bound in choice:
                 (index, factor), value = sources[name]
                 if index >= 0:
                     row[index] -= bound * factor
-                    least = least + bound * factor * max(lows[index], 0.0)
+                    least = least + bound * factor * max(ends[index][0], 0.0)
                 else:
                     limit = limit + bound * value
                     least = least + bound * value

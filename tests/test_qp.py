@@ -12,6 +12,7 @@ from scipy.optimize import lsq_linear, nnls
 from fitting import qp
 
 solve = jax.jit(qp.solve)
+within = jax.jit(qp.within)
 
 
 def problems(seed: int, m: int, channels: int = 7, rows: int = 60):
@@ -51,6 +52,88 @@ def test_upper_and_lower_bounds():
         assert 0.5 * ours @ ours <= best.cost * (1 + 1e-9)
         assert np.all(np.asarray(out.x[c]) >= low * (1 + 1e-12))
         assert np.all(np.asarray(out.x[c]) <= high * (1 + 1e-12))
+
+
+def kkt(hessian, linear, low, high, x):
+    """How far a point is from the conditions of a minimum, in the problem's own scales."""
+    roots = np.sqrt(np.einsum("cii->ci", hessian))
+    slope = (np.einsum("cij,cj->ci", hessian, x) - linear) / roots
+    slope /= np.abs(linear / roots).max(axis=1, keepdims=True)
+    pushed = np.where(
+        x <= low, np.minimum(slope, 0), np.where(x >= high, np.maximum(slope, 0), slope)
+    )
+    return np.abs(pushed).max()
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 10_000),
+    m=st.sampled_from([1, 2, 3, 5, 8]),
+    upper=st.booleans(),
+    guess=st.sampled_from([None, "low", "random"]),
+)
+def test_within_bounds_it_is_the_minimum_exactly(seed, m, upper, guess):
+    a, y, hessian, linear = problems(seed, m, channels=31)
+    size = np.abs(np.linalg.solve(hessian, linear[..., None])[..., 0]).max(axis=0)
+    rng = np.random.default_rng(seed)
+    low = np.where(rng.uniform(size=m) < 0.3, -0.05, 0.0) * size * np.ones((31, 1))
+    high = np.where(upper & (rng.uniform(size=m) < 0.6), 0.1 * size, np.inf) * np.ones(
+        (31, 1)
+    )
+    near = None
+    if guess:
+        inner = np.minimum(high, low + size * rng.uniform(0, 0.2, (31, m)))
+        near = (
+            low if guess == "low" else np.where(rng.uniform(size=(31, m)) < 0.5, low, inner)
+        )
+    with jax.enable_x64(True):
+        x, inverse = (np.asarray(v) for v in within(hessian, linear, low, high, near))
+    assert np.all((x >= low) & (x <= high))
+    assert kkt(hessian, linear, low, high, x) < 1e-9
+    for c in range(0, 31, 10):
+        best = lsq_linear(a[c], y[c], (low[c], high[c]), tol=1e-14)
+        ours = a[c] @ x[c] - y[c]
+        assert 0.5 * ours @ ours <= best.cost * (1 + 1e-9)
+        free = np.flatnonzero((x[c] > low[c]) & (x[c] < high[c]))
+        exact = np.zeros((m, m))
+        exact[np.ix_(free, free)] = np.linalg.inv(hessian[c][np.ix_(free, free)])
+        scale = np.sqrt(np.diag(hessian[c]))
+        np.testing.assert_allclose(
+            inverse[c] * np.outer(scale, scale),
+            exact * np.outer(scale, scale),
+            rtol=1e-6,
+            atol=1e-9,
+        )
+
+
+@pytest.mark.parametrize("m", [1, 4])
+def test_what_is_no_number_stays_none_and_spoils_nothing(m):
+    _, _, hessian, linear = problems(4, m)
+    hessian[2] = np.nan
+    linear[3] = 0.0
+    low, high = np.zeros((7, m)), np.full((7, m), np.inf)
+    with jax.enable_x64(True):
+        x = np.asarray(within(hessian, linear, low, high)[0])
+        alone = np.asarray(within(hessian[5:], linear[5:], low[5:], high[5:])[0])
+    assert not np.isfinite(x[2]).any()
+    np.testing.assert_array_equal(x[3], 0.0)
+    np.testing.assert_array_equal(x[5:], alone)
+
+
+def test_equal_columns_share_what_they_explain():
+    """Of two equal columns any share is a minimum, within bounds."""
+    _, _, hessian, linear = problems(6, 3)
+    twice = np.array([0, 1, 2, 1])
+    hessian, linear = hessian[:, twice][:, :, twice], linear[:, twice]
+    low, high = np.zeros((7, 4)), np.full((7, 4), np.inf)
+    with jax.enable_x64(True):
+        x, inverse = (np.asarray(v) for v in within(hessian, linear, low, high))
+        other, _ = within(hessian[:, :3, :3], linear[:, :3], low[:, :3], high[:, :3])
+    assert np.all(np.isfinite(inverse))
+    assert np.all(x >= 0)
+    np.testing.assert_allclose(
+        x[:, 1] + x[:, 3], np.asarray(other)[:, 1], rtol=1e-6, atol=1e-9 * np.abs(x).max()
+    )
 
 
 def test_sum_constraint_is_kept_and_its_inverse_is_the_constrained_one():

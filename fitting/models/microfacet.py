@@ -13,6 +13,7 @@ from fitting.expression import ModelError
 from fitting.geometry import Geometry
 from fitting.models import fresnel, multiple_scattering, shadowing
 from fitting.models.lobe import Shape, SlopeWidths
+from fitting.models.quotients import reciprocal
 from fitting.parameters import Parameter, shape
 
 ALPHA_SUPPORT = (1e-4, 1.5)
@@ -151,8 +152,9 @@ def stretched(parameters: Shape, g: Geometry) -> Stretched:
         alpha = parameters["alpha"]
         a2 = alpha**2
         # Not divided by alpha^2: the derivative would pass through alpha^-4, and overflow.
+        narrow = reciprocal(alpha)
         return Stretched(
-            (g.hx / alpha) ** 2 + (g.hy / alpha) ** 2,
+            (g.hx * narrow) ** 2 + (g.hy * narrow) ** 2,
             (g.wix**2 + g.wiy**2) * a2,
             (g.wox**2 + g.woy**2) * a2,
             a2,
@@ -167,7 +169,7 @@ def stretched(parameters: Shape, g: Geometry) -> Stretched:
     ix, iy = along(g.wix, g.wiy)
     ox, oy = along(g.wox, g.woy)
     return Stretched(
-        (hx / ax) ** 2 + (hy / ay) ** 2,
+        (hx * reciprocal(ax)) ** 2 + (hy * reciprocal(ay)) ** 2,
         (ax * ix) ** 2 + (ay * iy) ** 2,
         (ax * ox) ** 2 + (ay * oy) ** 2,
         ax * ay,

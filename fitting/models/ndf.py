@@ -7,6 +7,8 @@ import math
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from fitting.models.quotients import reciprocal
+
 
 def ggx(h2: Array, hz: Array, area: Array) -> Array:
     """GGX: ``D = 1 / (pi ax ay ((hx/ax)^2 + (hy/ay)^2 + hz^2)^2)``, 1/sr.
@@ -14,7 +16,8 @@ def ggx(h2: Array, hz: Array, area: Array) -> Array:
     Walter et al. 2007, eq. 33, in components: exact to rounding for any width, where
     ``cos^2 (a^2 - 1) + 1`` cancels.
     """
-    return 1.0 / (jnp.pi * area * (h2 + hz * hz) ** 2)
+    r = reciprocal(h2 + hz * hz)
+    return r * r * reciprocal(jnp.pi * area)
 
 
 def beckmann(h2: Array, hz: Array, area: Array) -> Array:

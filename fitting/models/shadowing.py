@@ -11,6 +11,7 @@ from jax.scipy.special import erfc
 from jaxtyping import Array
 
 from fitting.geometry import Geometry
+from fitting.models.quotients import half_excess, reciprocal
 from fitting.quadrature import unit_nodes
 
 Shadowing = Literal["correlated", "uncorrelated", "v_cavity", "bare"]
@@ -45,8 +46,8 @@ def visibility(
         return jnp.where(lit, 0.25 / jnp.where(lit, product, 1.0), shadowed)
     of_i, of_o = (jnp.where(up, v, 0.0) for v in cos_lambda())
     if kind == "uncorrelated":
-        return 0.25 / ((cos_i + of_i) * (cos_o + of_o))
-    return 0.25 / (product + cos_o * of_i + cos_i * of_o)
+        return 0.25 * reciprocal((cos_i + of_i) * (cos_o + of_o))
+    return 0.25 * reciprocal(product + cos_o * of_i + cos_i * of_o)
 
 
 def cos_lambda_ggx(t2: Array, cosine: Array) -> Array:
@@ -54,8 +55,7 @@ def cos_lambda_ggx(t2: Array, cosine: Array) -> Array:
 
     Heitz 2014, eq. 72, with ``t2 = (alpha sin)^2``.
     """
-    root = jnp.sqrt(cosine * cosine + t2)
-    return 0.5 * t2 / (root + cosine)
+    return half_excess(t2, cosine)
 
 
 def cos_lambda_beckmann(t2: Array, cosine: Array) -> Array:

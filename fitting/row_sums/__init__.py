@@ -13,7 +13,7 @@ to the same sums; `over_rows` takes the first that does:
   by channel, or that are many.
 """
 
-from fitting.row_sums.features import dependents
+from fitting.row_sums.features import dependents, n_basis
 from fitting.row_sums.passes import by_function, linear_moments, of_functions, over_rows
 from fitting.row_sums.reductions import FAST, add_up
 from fitting.row_sums.sums import Sums
@@ -25,6 +25,7 @@ __all__ = (
     "by_function",
     "dependents",
     "linear_moments",
+    "n_basis",
     "of_functions",
     "over_rows",
 )

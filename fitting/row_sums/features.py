@@ -49,9 +49,13 @@ def dependents(problem: Problem) -> tuple[tuple[int, int], ...]:
 
 def number(problem: Problem) -> int:
     """How many features there are."""
+    return n_basis(problem) + len(dependents(problem))
+
+
+def n_basis(problem: Problem) -> int:
+    """How many of them are basis functions."""
     model = problem.model
-    basis = sum(model.n_basis(i) for i in range(len(model.lobes)))
-    return basis + len(dependents(problem))
+    return sum(model.n_basis(i) for i in range(len(model.lobes)))
 
 
 def basis(problem: Problem, u: Array, functions: Callable) -> Array:

@@ -105,9 +105,12 @@ def linear_moments(problem: Problem, u: Array) -> tuple[Array, Array, Array]:
         f = basis(problem, u, lambda s: problem.model.basis(s, geometry))
         weight = cut(problem, problem.linear_weight, first)
         value = cut(problem, problem.linear_target, first)
+        if reductions.few_moments(problem, f):
+            return reductions.moments(f, weight[0], value)
         heavy = weight * weight
+        alike = f.ndim == 2 and len(weight) == 1
         return (
-            half_gram(f, heavy),
+            reductions.half_gram(f, weight[0]) if alike else half_gram(f, heavy),
             moments(heavy * value, f),
             jnp.sum(heavy * value * value),
         )

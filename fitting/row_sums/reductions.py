@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import jax
@@ -28,8 +28,9 @@ if TYPE_CHECKING:
     from fitting.reduced import Problem
 
 # Lets XLA add in another order, without which its reductions are scalar loops on CPUs.
-# NaN and infinities still propagate.
-FAST = {"xla_cpu_enable_fast_math": True}
+# NaN and infinities still propagate. Where there are wide registers, there are more of
+# them: enough for all the sums of a loop.
+FAST = {"xla_cpu_enable_fast_math": True, "xla_cpu_prefer_vector_width": 512}
 # More accumulators in one loop than this gain nothing, and take long to compile.
 _MOST_SUMS = 170
 # Channels in one loop: for which features are inlined, and from which they are read.
@@ -134,9 +135,35 @@ def _of_channels(
     return terms
 
 
-def _products(features: Sequence[Array], slope: Array) -> list[Array]:
+def _products(features: Iterable[Array], slope: Array) -> list[Array]:
     steep = [slope * f for f in features]
     return [steep[i] * steep[j] for i, j in zip(*pairs(len(steep)), strict=True)]
+
+
+def few_moments(problem: Problem, basis: Array) -> bool:
+    """Whether what `moments` adds up is not too much for one loop."""
+    channels, own = problem.linear_target.shape[0], problem.linear_weight.shape[0]
+    if basis.ndim > 2 or own > 1 or channels > _MOST_INLINED:
+        return False
+    count = basis.shape[0]
+    return count * (count + 1) // 2 + channels * (count + 1) <= _MOST_SUMS
+
+
+def moments(basis: Array, weight: Array, value: Array) -> tuple[Array, Array, Array]:
+    """Upper half ``(1, h)`` of the Gram matrix of a weighted basis, its products ``(c, b)``
+    with weighted values ``(c, n)``, and the square of these."""
+    heavy = [weight * f for f in basis]
+    squares = _products(basis, weight)
+    own = [f * (weight * v) for v in value for f in heavy]
+    square = sum((weight * v) ** 2 for v in value)
+    sums = add_up([*squares, *own, jnp.asarray(square)])
+    count = len(squares)
+    return sums[None, :count], sums[count:-1].reshape(len(value), -1), sums[-1]
+
+
+def half_gram(basis: Array, weight: Array) -> Array:
+    """Upper half ``(1, h)`` of the Gram matrix of a weighted basis."""
+    return add_up(_products(basis, weight))[None]
 
 
 def add_up(terms: Sequence[Array]) -> Array:

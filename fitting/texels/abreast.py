@@ -22,8 +22,6 @@ from fitting.texels.task import Task
 _STARTS = 2
 # Values beyond this are no values.
 LARGEST = 1e100
-# Where there are wide registers, there are more of them: enough for all the sums of a loop.
-_OPTIONS = {**row_sums.FAST, "xla_cpu_prefer_vector_width": 512}
 
 
 class Lanes(NamedTuple):
@@ -78,7 +76,7 @@ class Texels(NamedTuple):
     size: Array
 
 
-@compiled(_OPTIONS, quickly=False)
+@compiled(row_sums.FAST, quickly=False)
 def arranged(task: Task, data: Data, count: Array, *, own_weights: bool) -> Texels:
     """With weights of their own where not every value of a texel is known."""
     padding = ((0, 0), (0, 0), (0, task.heavy.shape[-1] - task.rows.size))
@@ -105,7 +103,7 @@ def arranged(task: Task, data: Data, count: Array, *, own_weights: bool) -> Texe
     return Texels(Seen(heavy, _split(values), *of_texels), used, count)
 
 
-@compiled(_OPTIONS, quickly=False)
+@compiled(row_sums.FAST, quickly=False)
 def scanned(task: Task, texels: Texels) -> tuple[Starts, State]:
     """Where they begin, and the states there."""
 
@@ -116,32 +114,32 @@ def scanned(task: Task, texels: Texels) -> tuple[Starts, State]:
     return _abreast(some, texels)
 
 
-@compiled(_OPTIONS, quickly=False)
+@compiled(row_sums.FAST, quickly=False)
 def begun(task: Task, u: Array, x: Array) -> State:
     """States before descents from ``u (t, k)`` and ``x (t, c, m)``."""
     return jax.vmap(functools.partial(begin, task))(u, x)
 
 
-@compiled(_OPTIONS, quickly=False)
+@compiled(row_sums.FAST, quickly=False)
 def gone_on(task: Task, texels: Texels, state: State, until: Array | np.ndarray) -> State:
     """After ``until`` steps in all, or at the end."""
     return _each(functools.partial(descend, task, until=until), texels, state)
 
 
-@compiled(_OPTIONS, quickly=False)
+@compiled(row_sums.FAST, quickly=False)
 def finished(task: Task, texels: Texels, state: State) -> Outcome:
     """What is known at the ends."""
     return _each(functools.partial(outcome, task), texels, state, texels.used)
 
 
-@compiled(_OPTIONS, quickly=False)
+@compiled(row_sums.FAST, quickly=False)
 def predicted(task: Task, u: Array, x: Array) -> Array:
     """The models' values ``(t, n, c)`` at the rows that are used."""
     values = jax.vmap(functools.partial(value, task))(u, x)
     return jnp.swapaxes(values[:, :, : task.rows.size], 1, 2)
 
 
-@compiled(_OPTIONS, quickly=False)
+@compiled(row_sums.FAST, quickly=False)
 def penalties_of(task: Task, scale: Array, u: Array, x: Array) -> Array:
     """What penalties add to the costs, ``(t,)``."""
 

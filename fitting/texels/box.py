@@ -45,15 +45,10 @@ class Box(eqx.Module):
 
 def make_box(unknowns: Unknowns) -> Box:
     """The box of unknowns whose constraints are bounds only."""
-    rows, limits = np.asarray(unknowns.rows), np.asarray(unknowns.limits)
-    channels, m = limits.shape[0], unknowns.n_coefficients
-    low, high = np.full((channels, m), -np.inf), np.full((channels, m), np.inf)
-    signs: list[list[int]] = [[] for _ in range(m)]
-    for row, limit in zip(rows, limits.T, strict=True):
-        (i,) = np.flatnonzero(row)
-        signs[i].append(int(np.sign(row[i])))
-        (low if row[i] > 0 else high)[:, i] = limit / row[i]
-    return Box(tuple(map(tuple, signs)), jnp.asarray(low), jnp.asarray(high))
+    low, high = np.asarray(unknowns.low), np.asarray(unknowns.high)
+    finite = zip(np.isfinite(low[0]), np.isfinite(high[0]), strict=True)
+    signs = tuple((1,) * int(a) + (-1,) * int(b) for a, b in finite)
+    return Box(signs, unknowns.low, unknowns.high)
 
 
 def held_at(box: Box, x: Array, slope: Array) -> Bool[Array, "c m"]:

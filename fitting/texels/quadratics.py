@@ -51,11 +51,11 @@ def minimised(task: Task, q: Quadratics) -> tuple[list[Array], Array]:
         ends = [[(s, v.reshape(axes)) for s, v in task.box.ends(i)] for i in range(m)]
         x, gain = best_of_choices(q.hessian, q.linear, ends)
     else:
-        x, gain = _by_interior_points(task, q)
+        x, gain = _by_pivoting(task, q)
     return x, jnp.sum(q.constant - 2.0 * gain, axis=0)
 
 
-def _by_interior_points(task: Task, q: Quadratics) -> tuple[list[Array], Array]:
+def _by_pivoting(task: Task, q: Quadratics) -> tuple[list[Array], Array]:
     """The same where there are too many coefficients to try what is at a bound."""
     m = len(q.linear)
     shape = jnp.broadcast_shapes(*(v.shape for v in jax.tree.leaves(q[:2])))
@@ -65,10 +65,12 @@ def _by_interior_points(task: Task, q: Quadratics) -> tuple[list[Array], Array]:
 
     h = jnp.stack([jnp.stack([*map(flat, row)], axis=-1) for row in q.hessian], axis=-2)
     b = jnp.stack([*map(flat, q.linear)], axis=-1)
-    unknowns = task.problem.unknowns
-    limits = jnp.expand_dims(unknowns.limits, tuple(range(1, len(shape))))
-    limits = jnp.broadcast_to(limits, (*shape, limits.shape[-1])).reshape(b.shape[0], -1)
-    x = qp.solve(h, b, unknowns.rows, limits).x
+
+    def ends(v: Array) -> Array:
+        v = jnp.expand_dims(v, tuple(range(1, len(shape))))
+        return jnp.broadcast_to(v, (*shape, m)).reshape(-1, m)
+
+    x, _ = qp.within(h, b, ends(task.box.low), ends(task.box.high))
     gain = jnp.sum(x * (b - 0.5 * qp.product(h, x)), axis=-1)
     return [x[:, i].reshape(shape) for i in range(m)], gain.reshape(shape)
 

@@ -35,6 +35,7 @@ NO_LOBES = {
     "microfacet",
     "multiple_scattering",
     "ndf",
+    "quotients",
     "retro",
     "shadowing",
     "slab",

@@ -122,7 +122,7 @@ def test_sentences(done):
     matt, glossy = done.choice.candidates
     for words in (
         "tiny: A ball under one lamp",
-        "What the scene requires - lambert + ggx: 22 free parameters, 165 operations",
+        "What the scene requires - lambert + ggx: 22 free parameters, 166 operations",
         "single precision (float32): rounding does not show",
         "one shape for all channels",
         "What cheaper candidates would miss - lambert changes this scene by",

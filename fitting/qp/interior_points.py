@@ -1,10 +1,4 @@
-"""Many small convex quadratic programs at once, one per channel.
-
-The coefficients of a channel (a handful) minimise a quadratic under bounds and, on
-request, the energy polytope. An interior-point method needs no branching, so all channels
-run together; and its last matrix is the inverse Hessian restricted to the free directions,
-which is what the elimination of the coefficients needs next.
-"""
+"""An interior-point method, which needs no branching: all channels run together."""
 
 from __future__ import annotations
 
@@ -14,7 +8,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-_RIDGE = 1e-14
+from fitting.qp.linear import inverse, scaled, times
+
 _MAX_STIFFNESS = 1e10
 _TOLERANCE = 1e-15
 _MAX_STEPS = 40
@@ -28,35 +23,6 @@ class QPSolution(NamedTuple):
     active: Bool[Array, "c p"]
 
 
-def inverse(matrix: Float[Array, "m m *b"]) -> Float[Array, "m m *b"]:
-    """Inverse of symmetric positive definite matrices by the sweep operator.
-
-    One rank-one update per row (Goodnight 1979, The American Statistician 33, 149):
-    elementwise over the batch, a few fused operations per row, quick to compile. Pivots
-    are kept above `_RIDGE` times the diagonal, which makes a singular matrix usable in
-    the directions that the data determine.
-    """
-    m = matrix.shape[0]
-    floor = _RIDGE * jnp.abs(jnp.einsum("ii...->i...", matrix)) + 1e-300
-    number = jnp.arange(m).reshape(m, *(1,) * (matrix.ndim - 2))
-
-    def sweep(i: Array, a: Array) -> Array:
-        here = number == i
-        row = a[i]
-        pivot = jnp.maximum(row[i], floor[i])
-        row = jnp.where(here, -1.0, row) / pivot
-        column = jnp.where(here, -1.0, row * pivot)
-        rest = jnp.where(here[:, None] | here, 0.0, a)
-        return rest - column[:, None] * row
-
-    return -jax.lax.fori_loop(0, m, sweep, matrix)
-
-
-def product(matrix: Float[Array, "*b m k"], x: Float[Array, "*b k"]) -> Array:
-    """Matrix times vector over the batch, as a fused sum instead of many small GEMMs."""
-    return jnp.sum(matrix * x[..., None, :], axis=-1)
-
-
 def solve(
     hessian: Float[Array, "c m m"],
     linear: Float[Array, "c m"],
@@ -66,31 +32,20 @@ def solve(
     """Minimise ``x' H x / 2 - b' x`` subject to ``rows x >= limits``, for every channel.
 
     Mehrotra's predictor-corrector method (Nocedal and Wright, Numerical Optimization,
-    alg. 16.4) on the problem scaled to a unit diagonal. A coefficient whose constraint
-    ends up active is put exactly on it where the constraint is a bound.
+    alg. 16.4) on the problem scaled to a unit diagonal; its last matrix is the inverse. A
+    coefficient whose constraint ends up active is put exactly on it where the constraint
+    is a bound.
     """
-    # The channels last, for loops in vector registers over them.
-    g, b = jnp.moveaxis(hessian, 0, -1), linear.T
-    diagonal = jnp.einsum("iic->ic", g)
-    d = jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
-    g = g / (d[:, None] * d) + _RIDGE * jnp.eye(d.shape[0], dtype=g.dtype)[:, :, None]
-    b = b / d
-    # Far from the least number, of which products below would be taken for 0.
-    size = jnp.maximum(jnp.max(jnp.abs(b), axis=0), 1e-200)
-    b = b / size
-
-    def unscaled(x: Array, free: Array) -> tuple[Array, Array]:
-        return (x * size / d).T, jnp.moveaxis(free / (d[:, None] * d), -1, 0)
-
+    g, b, units = scaled(hessian, linear)
     if rows.shape[0] == 0:
         free = inverse(g)
         none = jnp.zeros((g.shape[-1], 0), dtype=bool)
-        return QPSolution(*unscaled(_times(free, b), free), none)
+        return QPSolution(*units.back(times(free, b), free), none)
 
-    a = rows[:, :, None] / d
+    a = rows[:, :, None] / units.roots
     norm = jnp.sqrt(jnp.sum(a * a, axis=1))
     a = a / norm[:, None]
-    h = limits.T / (norm * size)
+    h = limits.T / (norm * units.size)
 
     def gram(weight: Array) -> Array:
         return jnp.sum(weight[:, None, None] * a[:, :, None] * a[:, None], axis=0)
@@ -104,14 +59,14 @@ def solve(
 
     def body(carry):
         x, s, z, steps, _ = carry
-        dual = _times(g, x) - b - transposed(z)
-        primal = _times(a, x) - h - s
+        dual = times(g, x) - b - transposed(z)
+        primal = times(a, x) - h - s
         mu = jnp.mean(s * z, axis=0)
         newton = inverse(g + gram(z / s))
 
         def direction(target: Array) -> tuple[Array, Array, Array]:
-            dx = _times(newton, transposed((target - z * primal) / s) - dual)
-            ds = _times(a, dx) + primal
+            dx = times(newton, transposed((target - z * primal) / s) - dual)
+            ds = times(a, dx) + primal
             return dx, ds, (target - z * ds) / s
 
         _, ds, dz = direction(-s * z)
@@ -136,14 +91,9 @@ def solve(
     x, s, z, _, _ = jax.lax.while_loop(unfinished, body, (x0, s0, z0, 0, gap0))
 
     stiffness = jnp.minimum(z / s, _MAX_STIFFNESS)
-    x, free = unscaled(x, inverse(g + gram(stiffness)))
+    x, free = units.back(x, inverse(g + gram(stiffness)))
     active = (z > s).T
     return QPSolution(_put_on_bounds(x, rows, limits, active), free, active)
-
-
-def _times(matrix: Array, x: Array) -> Array:
-    """Matrix times vector for every channel, the last axis of both."""
-    return jnp.sum(matrix * x, axis=1)
 
 
 def _put_on_bounds(x: Array, rows: Array, limits: Array, active: Array) -> Array:
