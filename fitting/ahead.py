@@ -4,22 +4,27 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from fitting import uncertainty, violations
+from fitting import predict, uncertainty, violations
 from fitting.reduced import Problem
 from fitting.solve import refine
+from fitting.summary import values_at
 
 
 def begin(problem: Problem, *, last: bool) -> None:
-    """Of a problem that is about to be searched: descents, albedos and uncertainties.
-
-    The latter two if this search is the ``last``, unless penalties are needed after all.
+    """Of a problem that is about to be searched: descents; and uncertainties, albedos and
+    predictions if this search is the ``last``, unless penalties are needed after all.
     """
     unknowns = problem.unknowns
     shape = (problem.target.shape[0], unknowns.n_coefficients)
     u = jax.ShapeDtypeStruct((unknowns.n_shape,), jnp.float64)
     x = jax.ShapeDtypeStruct(shape, jnp.float64)
     refine.begin(problem, u, x)
-    if last:
-        uncertainty.begin(problem, u, x)
-        violations.begin(problem)
+    if not last:
+        return
+    uncertainty.begin(problem, u, x)
+    values = values_at(problem, np.zeros(u.shape), np.zeros(x.shape))
+    violations.begin(problem, values)
+    for rows in (problem.kappa.size, problem.pairs.cos_i.size):
+        predict.begin(problem.model, values, rows)

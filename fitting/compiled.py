@@ -8,9 +8,11 @@ they are given, where the process has a folder for that (`fitting.kept_programs`
 from __future__ import annotations
 
 import functools
+import threading
 import weakref
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
 from uuid import uuid4
@@ -34,6 +36,10 @@ _QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level"
 # good, small ones included, and where they are used up the compiler aborts.
 _MANY = 30_000
 _REGIONS = Path("/proc/self/maps")
+# To trace in the background, one after the other: Python does one thing at a time, and what
+# was begun first is needed first, and can be compiled while the next is traced.
+_turn = threading.Lock()
+_AT_ONCE = nullcontext()
 
 
 def compiled(
@@ -92,7 +98,7 @@ class Compiled(Generic[_P, _T]):
 
         def made_ready() -> Callable[..., Any]:
             with jax.enable_x64(x64):
-                return self._made_ready(key, leaves)
+                return self._made_ready(key, leaves, turn=_turn)
 
         self._ready[key] = _background().submit(made_ready)
 
@@ -106,8 +112,13 @@ class Compiled(Generic[_P, _T]):
         """What was read or compiled; what is needed is read again."""
         self._ready.clear()
 
-    def _made_ready(self, key: tuple, leaves: list[Any]) -> Callable[..., Any]:
-        """The function of its arrays alone, kept if that is possible."""
+    def _made_ready(
+        self, key: tuple, leaves: list[Any], turn: AbstractContextManager = _AT_ONCE
+    ) -> Callable[..., Any]:
+        """The function of its arrays alone, kept if that is possible.
+
+        It is traced when it is its ``turn``.
+        """
         tree, keeps, *kinds = key
         if not keeps:
             return self._jitted(tree, leaves)
@@ -118,16 +129,22 @@ class Compiled(Generic[_P, _T]):
         program = kept_programs.read(described)
         if program is not None:
             return self._or_made_again(program, described, key, leaves)
-        return self._made_and_kept(described, tree, leaves)
+        return self._made_and_kept(described, tree, leaves, turn)
 
     def _made_and_kept(
-        self, described: str, tree: Any, leaves: list[Any]
+        self,
+        described: str,
+        tree: Any,
+        leaves: list[Any],
+        turn: AbstractContextManager = _AT_ONCE,
     ) -> Callable[..., Any]:
         # JAX's own cache finds functions by name and code: it is never to find this one,
         # since what was read there cannot be written again.
         jitted = self._jitted(tree, leaves, name=f"{self._function.__name__}_{uuid4().hex}")
         arrays = [v for v in leaves if _is_array(v)]
-        program = kept_programs.made(described, jitted, arrays)
+        with turn:
+            lowered = jitted.lower(*arrays)
+        program = kept_programs.made(described, lowered, len(arrays))
         return jitted if program is None else _joined(program)
 
     def _or_made_again(
@@ -186,13 +203,14 @@ def _are_few(leaves: list[Any]) -> bool:
 
 def _known(options: dict[str, Any]) -> dict[str, Any]:
     """Those that this version of the compiler knows."""
-    return {name: v for name, v in options.items() if _is_known(name, v)}
+    pairs = tuple(options.items())
+    return options if _are_known(*pairs) else dict(p for p in pairs if _are_known(p))
 
 
 @functools.cache
-def _is_known(name: str, value: Any) -> bool:
+def _are_known(*options: tuple[str, Any]) -> bool:
     try:
-        jax.jit(lambda: 0, compiler_options={name: value}).lower().compile()
+        jax.jit(lambda: 0, compiler_options=dict(options)).lower().compile()
     except jax.errors.JaxRuntimeError:
         return False
     return True

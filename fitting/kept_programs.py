@@ -37,6 +37,7 @@ _HOUR = 3600.0
 NEVER = 1e9
 _PLAIN = (type(None), bool, int, float, str)
 _folder: Path | None = None
+_looking = threading.Lock()
 
 
 class Program(NamedTuple):
@@ -69,17 +70,19 @@ def description(
         chosen = _described(sorted(options.items()))
     except TypeError:
         return None
-    return json.dumps([name, chosen, parts, arguments, _device(), *_surroundings()])
+    # What it takes long to see is seen by one thread, and the first one goes on first.
+    with _looking:
+        here = _surroundings()
+    return json.dumps([name, chosen, parts, arguments, _device(), *here])
 
 
-def made(described: str, jitted: Any, arrays: list[Any]) -> Program | None:
-    """The program of a jitted function of arrays, from now on kept if that is possible.
+def made(described: str, lowered: jax.stages.Lowered, n_arguments: int) -> Program | None:
+    """The program of a lowered function of arrays, from now on kept if that is possible.
 
     None if it calls others, such as LAPACK's, which would have to be found again.
     """
     from jax.experimental import serialize_executable
 
-    lowered = jitted.lower(*arrays)
     if "custom_call" in lowered.as_text():
         return None
     with _not_in_jax_cache:
@@ -91,7 +94,7 @@ def made(described: str, jitted: Any, arrays: list[Any]) -> Program | None:
     program = Program(run, lowered.out_tree)
     with contextlib.suppress(NotImplementedError, TypeError, ValueError):
         payload, *_ = serialize_executable.serialize(compiled)
-        head = [described, len(arrays), _outlined(program.out_tree)]
+        head = [described, n_arguments, _outlined(program.out_tree)]
         content = zlib.compress(json.dumps(head).encode() + b"\n" + payload, 1)
         with contextlib.suppress(OSError):
             path = _path(described)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Mapping
 
@@ -28,6 +29,17 @@ def _cached(expression: str) -> Model:
 @compiled()
 def _evaluate(model: Model, values: dict, geometry: Geometry) -> jax.Array:
     return model(values, geometry)
+
+
+def begin(model: Model, values: Mapping[str, np.ndarray], rows: int) -> None:
+    """Compile in the background what `predict_geometry` needs for so many rows.
+
+    Of ``values`` only the shapes count; call with x64 enabled.
+    """
+    one = jax.ShapeDtypeStruct((bucket(rows),), np.float64)
+    like = {k: jax.ShapeDtypeStruct(v.shape, np.float64) for k, v in values.items()}
+    fields = (f.name for f in dataclasses.fields(Geometry) if f.name != "polar")
+    _evaluate.begin(model, like, Geometry(**dict.fromkeys(fields, one)))  # pyright: ignore
 
 
 def predict(

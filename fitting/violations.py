@@ -17,7 +17,7 @@ from fitting.models.lobe import THROUGH
 from fitting.predict import predict_geometry
 from fitting.problem import reciprocity_pairs
 from fitting.reduced import Problem
-from fitting.summary import Found, values_at
+from fitting.summary import Found
 
 _DENSE_NODES = 32
 _THETA_DEG = np.concatenate([np.arange(0.0, 80.0, 4.0), np.arange(80.0, 90.0, 0.5)])
@@ -54,11 +54,8 @@ def worst_albedo(model: Model, found: list[Found]) -> WorstAlbedo:
     return worst
 
 
-def begin(problem: Problem) -> None:
-    """Compile in the background what `worst_albedo` needs."""
-    u = np.zeros(problem.unknowns.n_shape)
-    x = np.zeros((problem.target.shape[0], problem.unknowns.n_coefficients))
-    values = values_at(problem, u, x)
+def begin(problem: Problem, values: dict[str, np.ndarray]) -> None:
+    """Compile in the background what both need; of values, the shapes count."""
     for side in lit_sides(problem.model):
         _dense_albedo.begin(problem.model, values, _cosines(), np.float64(0.0), side)
 

@@ -31,25 +31,31 @@ if TYPE_CHECKING:
 # NaN and infinities still propagate. Where there are wide registers, there are more of
 # them: enough for all the sums of a loop.
 FAST = {"xla_cpu_enable_fast_math": True, "xla_cpu_prefer_vector_width": 512}
-# More accumulators in one loop than this gain nothing, and take long to compile.
-_MOST_SUMS = 170
+# More accumulators in one loop than this gain nothing, and take long to compile; longer
+# than all that is gained where rows are few.
+_MOST_SUMS, _MOST_OF_FEW, _FEW = 170, 60, 2048
 # Channels in one loop: for which features are inlined, and from which they are read.
-_MOST_INLINED, _MOST_HELD = 8, 4
+_MOST_INLINED, _MOST_HELD, _MOST_HELD_OF_FEW = 8, 4, 2
 
 
 def all_at_once(problem: Problem) -> bool:
     """Whether the sums of all channels are not too many for one loop."""
     channels = problem.target.shape[0]
-    return channels <= _MOST_INLINED and _sums(problem, channels) <= _MOST_SUMS
+    return channels <= _MOST_INLINED and _sums(problem, channels) <= _most_sums(problem)
 
 
 def some_at_once(problem: Problem) -> bool:
     """Whether those of the channels are not for which features are `held` in a loop."""
-    return _sums(problem, _channels_held(problem)) <= _MOST_SUMS
+    return _sums(problem, _channels_held(problem)) <= _most_sums(problem)
+
+
+def _most_sums(problem: Problem) -> int:
+    return _MOST_OF_FEW if problem.kappa.size <= _FEW else _MOST_SUMS
 
 
 def _channels_held(problem: Problem) -> int:
-    return min(problem.target.shape[0], _MOST_HELD)
+    few = problem.kappa.size <= _FEW
+    return min(problem.target.shape[0], _MOST_HELD_OF_FEW if few else _MOST_HELD)
 
 
 def _sums(problem: Problem, channels: int) -> int:
