@@ -12,9 +12,10 @@ from fitting.solve import refine
 from fitting.summary import values_at
 
 
-def begin(problem: Problem, *, last: bool) -> None:
+def begin(problem: Problem, *, last: bool, whole: bool) -> None:
     """Of a problem that is about to be searched: descents; and uncertainties, albedos and
     predictions if this search is the ``last``, unless penalties are needed after all.
+    Predictions are made of the ``whole``, not of one channel of several.
     """
     unknowns = problem.unknowns
     shape = (problem.target.shape[0], unknowns.n_coefficients)
@@ -26,5 +27,6 @@ def begin(problem: Problem, *, last: bool) -> None:
     uncertainty.begin(problem, u, x)
     values = values_at(problem, np.zeros(u.shape), np.zeros(x.shape))
     violations.begin(problem, values)
-    for rows in (problem.kappa.size, problem.pairs.cos_i.size):
-        predict.begin(problem.model, values, rows)
+    if whole:
+        for rows in (problem.kappa.size, problem.pairs.cos_i.size):
+            predict.begin(problem.model, values, rows)

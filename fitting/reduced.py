@@ -87,8 +87,8 @@ class Unknowns(eqx.Module):
             )
         }
 
-    def coefficients(self, x: Float[Array, " m"], c: Float[Array, " q"]) -> dict:
-        """All coefficients of one channel, whose constants are ``c``."""
+    def coefficients(self, x: Float[Array, "m ..."], c: Float[Array, "q ..."]) -> dict:
+        """All coefficients of one channel or several, whose constants are ``c``."""
         return {
             name: factor * x[index] if index >= 0 else c[i]
             for i, (name, (index, factor)) in enumerate(

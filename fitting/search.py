@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import jax
@@ -20,6 +20,7 @@ from fitting.predict import predict_geometry
 from fitting.problem import for_channel, prepare
 from fitting.reduced import Problem
 from fitting.rows import Rows
+from fitting.side_by_side import side_by_side
 from fitting.solve import Solution, refine
 from fitting.summary import Found, joined_values
 
@@ -63,11 +64,31 @@ def _search_one(
     *,
     last: bool = True,
 ) -> Found:
-    ahead.begin(p, last=last and not options.robust)
+    last, whole = last and not options.robust, not options.per_channel_shape
+    ahead.begin(p, last=last, whole=whole)
     count = max(1, options.starts) if p.unknowns.n_shape else 1
     points, x = starts.best_starts(p, count)
     begin = [*zip(points, x, strict=True), *([also] if also else [])]
-    return _best(p, [_pulled_back(p, refined(p, u, c)) for u, c in begin])
+    return _best(p, _each(p, begin, then=_pulled_back))
+
+
+def _each(
+    p: Problem,
+    begin: Sequence[tuple[ArrayLike, ArrayLike]],
+    then: Callable[[Problem, Solution], Solution] = lambda _, end: end,
+) -> list[Solution]:
+    """Where starts end, the first by itself: what it compiles, the others use."""
+
+    def job(u: ArrayLike, x: ArrayLike) -> Callable[[], Solution]:
+        def run() -> Solution:
+            # Threads do not inherit it.
+            with jax.enable_x64(True):
+                return then(p, refined(p, u, x))
+
+        return run
+
+    first, *others = [job(*start) for start in begin]
+    return [first(), *side_by_side(others, p.target.size)]
 
 
 def refined(p: Problem, u: ArrayLike, x: ArrayLike) -> Solution:
@@ -100,7 +121,7 @@ def again(
     """Refit with other residuals, from every end: the order of the minima may change."""
     out: list[Found] = []
     for p, before in zip(problems(rows, model, options, **kwargs), found, strict=True):
-        out.append(_best(p, [refined(p, e.u, e.x) for e in before.ends]))
+        out.append(_best(p, _each(p, [(e.u, e.x) for e in before.ends])))
     return out
 
 

@@ -44,10 +44,7 @@ def values_at(problem: Problem, u: np.ndarray, x: np.ndarray) -> dict[str, np.nd
     """
     unknowns = jax.device_get(problem.unknowns)
     shape = unknowns.shape(u)
-    linear = [
-        unknowns.coefficients(own, c)
-        for own, c in zip(x, np.asarray(unknowns.coefficient_constant).T, strict=True)
-    ]
+    linear = unknowns.coefficients(np.asarray(x).T, unknowns.coefficient_constant)
     out = {n: np.asarray(v) for n, v in shape.items()}
     for name, constant, (index, _) in zip(
         unknowns.shape_names,
@@ -57,9 +54,7 @@ def values_at(problem: Problem, u: np.ndarray, x: np.ndarray) -> dict[str, np.nd
     ):
         if index < 0 and np.ptp(constant) > 0:
             out[name] = constant
-    return out | {
-        n: np.asarray([float(one[n]) for one in linear]) for n in unknowns.coefficient_names
-    }
+    return out | {n: np.array(v, dtype=np.float64) for n, v in linear.items()}
 
 
 def joined_values(found: list[Found]) -> dict[str, np.ndarray]:

@@ -59,13 +59,11 @@ def plain(p: Problem, u, a):
     return gram, np.einsum("cn,fn->cf", d * r, features), np.sum(r * r)
 
 
-# Channels for which features are inlined, for which they are held,
-# and most sums in one loop.
 WAYS = {
-    "products": (0, 4, 0),
-    "held": (0, 4, 999),
-    "held for all": (0, 99, 9999),
-    "inlined": (99, 4, 9999),
+    "products": reductions.Most(0, 4, 0),
+    "held": reductions.Most(0, 4, 999),
+    "held for all": reductions.Most(0, 99, 9999),
+    "inlined": reductions.Most(99, 4, 9999),
 }
 
 
@@ -82,10 +80,7 @@ WAYS = {
     ],
 )
 def test_all_ways_are_the_sums_of_plain_arrays(monkeypatch, expression, options, way):
-    at_once, held, most = WAYS[way]
-    monkeypatch.setattr(reductions, "_MOST_INLINED", at_once)
-    monkeypatch.setattr(reductions, "_MOST_HELD", held)
-    monkeypatch.setattr(reductions, "_MOST_SUMS", most)
+    monkeypatch.setattr(reductions, "_most", lambda _: WAYS[way])
     with jax.enable_x64(True):
         p = problem(expression, **options)
         p = dataclasses.replace(p, chunk=p.kappa.size // 2)

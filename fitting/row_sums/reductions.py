@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -31,31 +31,39 @@ if TYPE_CHECKING:
 # NaN and infinities still propagate. Where there are wide registers, there are more of
 # them: enough for all the sums of a loop.
 FAST = {"xla_cpu_enable_fast_math": True, "xla_cpu_prefer_vector_width": 512}
-# More accumulators in one loop than this gain nothing, and take long to compile; longer
-# than all that is gained where rows are few.
-_MOST_SUMS, _MOST_OF_FEW, _FEW = 170, 60, 2048
-# Channels in one loop: for which features are inlined, and from which they are read.
-_MOST_INLINED, _MOST_HELD, _MOST_HELD_OF_FEW = 8, 4, 2
+
+
+class Most(NamedTuple):
+    """Channels in one loop for which features are inlined, and for which they are read; and
+    sums: more accumulators gain nothing, and take long to compile."""
+
+    inlined: int
+    held: int
+    sums: int
+
+
+_OF_MANY_ROWS = Most(8, 4, 170)
+# Compiling takes longer than all that is gained.
+_OF_FEW_ROWS, _FEW = Most(8, 2, 60), 2048
 
 
 def all_at_once(problem: Problem) -> bool:
     """Whether the sums of all channels are not too many for one loop."""
-    channels = problem.target.shape[0]
-    return channels <= _MOST_INLINED and _sums(problem, channels) <= _most_sums(problem)
+    channels, most = problem.target.shape[0], _most(problem)
+    return channels <= most.inlined and _sums(problem, channels) <= most.sums
 
 
 def some_at_once(problem: Problem) -> bool:
     """Whether those of the channels are not for which features are `held` in a loop."""
-    return _sums(problem, _channels_held(problem)) <= _most_sums(problem)
+    return _sums(problem, _channels_held(problem)) <= _most(problem).sums
 
 
-def _most_sums(problem: Problem) -> int:
-    return _MOST_OF_FEW if problem.kappa.size <= _FEW else _MOST_SUMS
+def _most(problem: Problem) -> Most:
+    return _OF_FEW_ROWS if problem.kappa.size <= _FEW else _OF_MANY_ROWS
 
 
 def _channels_held(problem: Problem) -> int:
-    few = problem.kappa.size <= _FEW
-    return min(problem.target.shape[0], _MOST_HELD_OF_FEW if few else _MOST_HELD)
+    return min(problem.target.shape[0], _most(problem).held)
 
 
 def _sums(problem: Problem, channels: int) -> int:
@@ -149,10 +157,10 @@ def _products(features: Iterable[Array], slope: Array) -> list[Array]:
 def few_moments(problem: Problem, basis: Array) -> bool:
     """Whether what `moments` adds up is not too much for one loop."""
     channels, own = problem.linear_target.shape[0], problem.linear_weight.shape[0]
-    if basis.ndim > 2 or own > 1 or channels > _MOST_INLINED:
+    most, count = _most(problem), basis.shape[0]
+    if basis.ndim > 2 or own > 1 or channels > most.inlined:
         return False
-    count = basis.shape[0]
-    return count * (count + 1) // 2 + channels * (count + 1) <= _MOST_SUMS
+    return count * (count + 1) // 2 + channels * (count + 1) <= most.sums
 
 
 def moments(basis: Array, weight: Array, value: Array) -> tuple[Array, Array, Array]:
