@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 
 import jax
 import numpy as np
@@ -34,7 +35,19 @@ def candidates(problem: Problem) -> np.ndarray:
     their widths, since exchanging them changes nothing.
     """
     unknowns = problem.unknowns
-    k = unknowns.n_shape
+    names, declared = unknowns.free_shape, problem.model.parameters()
+    lower, upper = np.asarray(unknowns.lower), np.asarray(unknowns.upper)
+    ends = zip(lower.tolist(), upper.tolist(), strict=True)
+    return _even(tuple(names), tuple(declared[n] for n in names), tuple(ends)).copy()
+
+
+@functools.lru_cache(maxsize=64)
+def _even(
+    names: tuple[str, ...],
+    parameters: tuple[Parameter, ...],
+    ends: tuple[tuple[float, float], ...],
+) -> np.ndarray:
+    k = len(names)
     if k == 0:
         return np.zeros((1, 0))
     count = _SCAN_SIZES.get(k, 128)
@@ -45,30 +58,24 @@ def candidates(problem: Problem) -> np.ndarray:
     share = np.mod(0.5 + np.outer(np.arange(count), steps), 1.0)
     if k == 1:
         share = (np.arange(count)[:, None] + 0.5) / count
-    declared = problem.model.parameters()
-    lower, upper = np.asarray(unknowns.lower), np.asarray(unknowns.upper)
     points = np.empty((count, k))
-    for j, name in enumerate(unknowns.free_shape):
-        parameter = declared[name]
-        low, high = (float(np.clip(s, lower[j], upper[j])) for s in parameter.start)
+    for j, (parameter, (lower, upper)) in enumerate(zip(parameters, ends, strict=True)):
+        low, high = (float(np.clip(s, lower, upper)) for s in parameter.start)
         if not low < high:
-            low, high = float(lower[j]), float(upper[j])
+            low, high = lower, upper
         if parameter.scale == "log":
             value = low * (high / low) ** share[:, j]
         else:
             value = low + (high - low) * share[:, j]
-        points[:, j] = [
-            to_real_line(parameter.scale, v, float(lower[j]), float(upper[j]))
-            for v in value
-        ]
-    for group in _equal_lobes(unknowns.free_shape):
+        points[:, j] = [to_real_line(parameter.scale, v, lower, upper) for v in value]
+    for group in _equal_lobes(names):
         order = np.argsort(points[:, group[0]], axis=1)
         for columns in group:
             points[:, columns] = np.take_along_axis(points[:, columns], order, axis=1)
     return points
 
 
-def _equal_lobes(names: list[str]) -> list[list[list[int]]]:
+def _equal_lobes(names: Sequence[str]) -> list[list[list[int]]]:
     """Per family of equal lobes: for every parameter, its columns in lobe order."""
     families: dict[str, dict[str, list[int]]] = {}
     for j, name in enumerate(names):

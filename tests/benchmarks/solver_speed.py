@@ -7,8 +7,9 @@
 coefficients: the scan of the profile and the refinement of its best start, compiled.
 Against it, on the same arrays: scipy's trust region and Ceres (if pyceres is installed)
 over all parameters at once with the exact dense Jacobian, compiled; and, per pass, a kernel
-written by hand in C for this very model (if there is a C compiler), on one core. Least of
-a few, on a machine that does nothing else.
+written by hand in C for this very model (if there is a C compiler), on one core: as often
+as the refinement has steps, and as often as it and the scan go over all rows together.
+Least of a few, on a machine that does nothing else.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import least_squares
 
-from fitting import FitOptions, Model
+from fitting import FitOptions, Model, sampling, starts
 from fitting.geometry import Geometry
 from fitting.padding import padded_geometry
 from fitting.predict import predict_geometry
@@ -106,6 +107,12 @@ def ours(problem: Problem) -> Solution:
     """The scan, and its best start refined."""
     points, x = best_starts(problem, 1)
     return jax.device_get(refine(problem, jnp.asarray(points[0]), jnp.asarray(x[0])))
+
+
+def scanned(problem: Problem) -> int:
+    """How many rows the scan looks at, over and over again."""
+    rows = starts.thinned(problem, sampling.brightness(problem)).kappa.size
+    return rows * len(starts.candidates(problem))
 
 
 class Dense:
@@ -278,17 +285,19 @@ def line(n: int, channels: int) -> str:
     try:
         mine, theirs = passes(problem, 2 * repeats)
         cells.append(f"{1e3 * mine:.2f} / {1e3 * theirs:.2f} ms = {mine / theirs:.1f}")
-        cells.append(f"{own / (theirs * int(end.steps)):.1f}")
+        steps, more_rows = int(end.steps), scanned(problem) / n
+        cells.append(f"{own / (theirs * steps):.1f}")
+        cells.append(f"{own / (theirs * (steps + more_rows)):.1f}")
     except RuntimeError as error:
-        cells += [str(error), "-"]
+        cells += [str(error), "-", "-"]
     cells.append("-" if more is None else f"{more / 1e6:.0f} MB")
     return "| " + " | ".join(cells) + " |"
 
 
 HEADER = """\
 | rows x channels | ours | steps | scipy | Ceres | pass, ours / C | fit / (steps x C) | \
-memory beyond the rows |
-|---|---|---|---|---|---|---|---|"""
+fit / (steps and scan x C) | memory beyond the rows |
+|---|---|---|---|---|---|---|---|---|"""
 
 
 def main(arguments: list[str]) -> None:
