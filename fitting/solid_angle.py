@@ -143,12 +143,13 @@ def _zones(theta: np.ndarray, ring: np.ndarray) -> np.ndarray:
 def _sparse_rings(theta: np.ndarray, delta: np.ndarray, ring: np.ndarray) -> np.ndarray:
     """Rings whose rows are much farther apart than those of the usual ring."""
     level = np.bincount(ring, theta) / np.bincount(ring)
-    arc = np.empty(level.size)
-    for k in range(level.size):
-        angle = np.sort(np.mod(delta[ring == k], 2 * np.pi))
-        gaps = np.diff(angle)
-        gaps = gaps[gaps > _SAME_ANGLE]
-        arc[k] = (gaps.min() if gaps.size else np.pi) * np.sin(level[k])
+    angle = np.mod(delta, 2 * np.pi)
+    order = np.lexsort((angle, ring))
+    gaps, own = np.diff(angle[order]), ring[order][1:]
+    counts = (np.diff(ring[order]) == 0) & (gaps > _SAME_ANGLE)
+    least = np.full(level.size, np.inf)
+    np.minimum.at(least, own[counts], gaps[counts])
+    arc = np.where(np.isfinite(least), least, np.pi) * np.sin(level)
     return arc > _SPARSE * np.median(arc) + _SAME_ANGLE
 
 
@@ -158,8 +159,8 @@ def _widths(delta: np.ndarray, ring: np.ndarray) -> np.ndarray:
     side = np.sin(delta)
     one_sided = bool(np.all(side > -_SAME_ANGLE) or np.all(side < _SAME_ANGLE))
     out = np.empty(delta.size)
-    for k in range(int(ring.max()) + 1):
-        rows = np.flatnonzero(ring == k)
+    order = np.argsort(ring, kind="stable")
+    for rows in np.split(order, np.cumsum(np.bincount(ring))[:-1]):
         out[rows] = _azimuth_widths(delta[rows].tobytes(), one_sided)
     return out
 
