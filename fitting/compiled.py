@@ -78,10 +78,18 @@ class Compiled(Generic[_P, _T]):
         key = _key(tree, leaves)
         run = self._ready.get(key)
         if isinstance(run, Future):
-            run = self._ready[key] = run.result()
+            run = self._ready[key] = self._made(key, run)
         if run is None:
             run = self._ready[key] = self._made_ready(key, leaves)
         return run(*arrays)
+
+    def _made(self, key: tuple, future: Future) -> Callable[..., Any]:
+        try:
+            return future.result()
+        except BaseException:
+            # What went wrong is said once, and tried again the next time.
+            self._ready.pop(key, None)
+            raise
 
     def begin(self, *args: Any, **kwargs: Any) -> None:
         """Read or compile in the background what a call with such arguments will need.
@@ -145,7 +153,7 @@ class Compiled(Generic[_P, _T]):
         with turn:
             lowered = jitted.lower(*arrays)
         program = kept_programs.made(described, lowered, len(arrays))
-        return jitted if program is None else _joined(program)
+        return self._jitted(tree, leaves) if program is None else _joined(program)
 
     def _or_made_again(
         self, program: Program, described: str, key: tuple, leaves: list[Any]
@@ -156,7 +164,10 @@ class Compiled(Generic[_P, _T]):
 
         def run(*arrays: Any) -> Any:
             try:
-                return read(*arrays)
+                # Waiting for it, once: what cannot be run may say so at the end only.
+                out = jax.block_until_ready(read(*arrays))
+                self._ready[key] = read
+                return out
             except jax.errors.JaxRuntimeError:
                 given = iter(arrays)
                 all_of_them = [next(given) if v is None else v[0] for v in others]
@@ -204,7 +215,9 @@ def _are_few(leaves: list[Any]) -> bool:
 def _known(options: dict[str, Any]) -> dict[str, Any]:
     """Those that this version of the compiler knows."""
     pairs = tuple(options.items())
-    return options if _are_known(*pairs) else dict(p for p in pairs if _are_known(p))
+    if not pairs or _are_known(*pairs):
+        return options
+    return dict(p for p in pairs if _are_known(p))
 
 
 @functools.cache

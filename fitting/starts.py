@@ -11,7 +11,7 @@ import numpy as np
 
 from fitting import sampling
 from fitting.models.lobe import AxisPeak, Lobe
-from fitting.parameters import Parameter, to_real_line
+from fitting.parameters import Parameter, Scale, to_real_line
 from fitting.peaks import peaks
 from fitting.reduced import Problem
 from fitting.solve import scan
@@ -38,13 +38,14 @@ def candidates(problem: Problem) -> np.ndarray:
     names, declared = unknowns.free_shape, problem.model.parameters()
     lower, upper = np.asarray(unknowns.lower), np.asarray(unknowns.upper)
     ends = zip(lower.tolist(), upper.tolist(), strict=True)
-    return _even(tuple(names), tuple(declared[n] for n in names), tuple(ends)).copy()
+    ranges = ((declared[n].scale, tuple(declared[n].start)) for n in names)
+    return _even(tuple(names), tuple(ranges), tuple(ends)).copy()
 
 
 @functools.lru_cache(maxsize=64)
 def _even(
     names: tuple[str, ...],
-    parameters: tuple[Parameter, ...],
+    ranges: tuple[tuple[Scale, tuple[float, ...]], ...],
     ends: tuple[tuple[float, float], ...],
 ) -> np.ndarray:
     k = len(names)
@@ -59,15 +60,15 @@ def _even(
     if k == 1:
         share = (np.arange(count)[:, None] + 0.5) / count
     points = np.empty((count, k))
-    for j, (parameter, (lower, upper)) in enumerate(zip(parameters, ends, strict=True)):
-        low, high = (float(np.clip(s, lower, upper)) for s in parameter.start)
+    for j, ((scale, start), (lower, upper)) in enumerate(zip(ranges, ends, strict=True)):
+        low, high = (float(np.clip(s, lower, upper)) for s in start)
         if not low < high:
             low, high = lower, upper
-        if parameter.scale == "log":
+        if scale == "log":
             value = low * (high / low) ** share[:, j]
         else:
             value = low + (high - low) * share[:, j]
-        points[:, j] = [to_real_line(parameter.scale, v, lower, upper) for v in value]
+        points[:, j] = [to_real_line(scale, v, lower, upper) for v in value]
     for group in _equal_lobes(names):
         order = np.argsort(points[:, group[0]], axis=1)
         for columns in group:

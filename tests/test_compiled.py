@@ -200,28 +200,60 @@ def test_what_was_compiled_for_others_is_not_kept(folder):
     assert len(_files(folder)) == 1
 
 
+def _turned(a):
+    return jax.lax.fori_loop(0, 3, lambda i, v: jnp.sin(v) + v[::-1], jnp.pad(a + a, 3))
+
+
 @pytest.mark.usefixtures("jax_keeps_all")
-def test_what_cannot_be_run_is_made_again(folder):
-    """A program as a version of this package wrote it that took it from JAX's cache."""
+@pytest.mark.parametrize("size", [2, 300_000], ids=["at once", "later"])
+def test_what_cannot_be_run_is_made_again(folder, size):
+    """A program as a version of this package wrote it that took it from JAX's cache.
 
-    def padded(a):
-        return jnp.pad(a + a, 3)
-
+    Whether it says so when it is called, or when its results are looked at.
+    """
+    a = np.ones(size, np.float32)
     for _ in range(2):
         jax.clear_caches()
-        from_jax = jax.jit(padded).lower(np.ones(2)).compile()
+        from_jax = jax.jit(_turned).lower(a).compile()
     payload, *_ = serialize_executable.serialize(from_jax)
-    Compiled(Counted(padded), None)(np.ones(2))
+    expected = np.asarray(Compiled(Counted(_turned), None)(a))
     (path,) = _files(folder)
     head, _, _ = zlib.decompress(path.read_bytes()).partition(b"\n")
     path.write_bytes(zlib.compress(head + b"\n" + payload))
     jax.clear_caches()
     for traced in (1, 0):
-        counted = Counted(padded)
+        counted = Counted(_turned)
         again = Compiled(counted, None)
         for _ in range(2):
-            np.testing.assert_array_equal(again(np.ones(2)), [0, 0, 0, 2, 2, 0, 0, 0])
+            np.testing.assert_array_equal(again(a), expected)
         assert counted.traced == traced
+
+
+@pytest.mark.usefixtures("jax_keeps_all")
+def test_what_is_not_kept_is_found_in_the_cache_of_jax(tmp_path_factory):
+    """And does not fill it: it has one name."""
+    found = []
+    for _ in range(3):
+        jax.clear_caches()
+        Compiled(Counted(jnp.linalg.eigvalsh), None)(np.eye(2))
+        cache = Path(jax.config.jax_compilation_cache_dir)  # pyright: ignore
+        found.append(len([p for p in cache.iterdir() if "counted" in p.name]))
+    assert found[0] == found[-1]
+
+
+def test_what_went_wrong_is_tried_again():
+    def wrong(a):
+        if len(counted.seen) == 1:
+            raise RuntimeError("not now")
+        return a + 1
+
+    counted = Counted(wrong)
+    counted.seen = []
+    function = Compiled(lambda a: counted.seen.append(a) or wrong(a), None)
+    function.begin(np.ones(2))
+    with pytest.raises(RuntimeError, match="not now"):
+        function(np.ones(2))
+    np.testing.assert_array_equal(function(np.ones(2)), [2, 2])
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "another"])

@@ -136,6 +136,35 @@ def test_equal_columns_share_what_they_explain():
     )
 
 
+@pytest.mark.parametrize("apart", [0.0, 1e-9, 1e-7, 1e-5])
+@pytest.mark.parametrize("bound", ["one", "all"])
+def test_two_pairs_of_nearly_equal_columns(apart, bound):
+    """Singular in two directions, and bounded: still a minimum, and never off."""
+    rng = np.random.default_rng(0)
+    a = np.abs(rng.normal(size=(2000, 10, 4)))
+    a[..., 3] = a[..., 0] + apart * rng.normal(size=(2000, 10))
+    a[..., 2] = a[..., 1] + apart * rng.normal(size=(2000, 10))
+    y = a.sum(axis=-1)
+    hessian, linear = np.einsum("cni,cnj->cij", a, a), np.einsum("cni,cn->ci", a, y)
+    low, high = np.zeros((2000, 4)), np.full((2000, 4), np.inf)
+    high[:, 1] = 0.7
+    if bound == "all":
+        high = np.minimum(high, 5.0)
+    finite = np.isfinite(high[0])
+    rows = np.concatenate([np.eye(4), -np.eye(4)[finite]])
+    limits = np.concatenate([low, -high[:, finite]], axis=1)
+
+    def left(x) -> np.ndarray:
+        r = np.einsum("cni,ci->cn", a, np.asarray(x)) - y
+        return np.sum(r**2, axis=1) / np.sum(y**2, axis=1)
+
+    with jax.enable_x64(True):
+        ours = left(within(hessian, linear, low, high)[0])
+        exact = left(solve(hessian, linear, rows, limits).x)
+    # A ridge of 1e-12 decides between points that cost the same but for that much.
+    assert np.all(ours <= exact * (1 + 1e-6) + 2e-12)
+
+
 def test_sum_constraint_is_kept_and_its_inverse_is_the_constrained_one():
     """With sum(x) <= s active, the inverse is that of the Hessian on sum(dx) = 0."""
     _, _, hessian, linear = problems(5, 3)

@@ -11,7 +11,8 @@ from fitting.qp.linear import inverse, scaled, times
 # Of problems scaled to a unit diagonal and a right-hand side of 1 at most.
 _NEGLIGIBLE = 1e-12
 _PATIENCE = 3
-_REFINEMENTS = 2
+_REFINEMENTS = 3
+_RIDGE = 1e-12
 _MOST_EXCHANGES = 40
 
 
@@ -28,29 +29,36 @@ def within(
     principal pivoting (Júdice and Pires 1994, Computers & Operations Research 21, 587;
     Kim and Park 2011, SIAM J. Sci. Comput. 33, 3261): all unknowns whose sign is wrong are
     exchanged at once, and where that does not lessen their number, one at a time, which
-    ends for positive definite matrices. ``near`` is where to begin.
+    ends for positive definite matrices. A ridge far above rounding makes all of them that,
+    also where columns are alike; what it adds is taken away in the end. ``near`` is where
+    to begin.
     """
     g, b, units = scaled(hessian, linear)
     ends = jnp.stack([low.T, high.T]) * units.roots / units.size
     number = jnp.arange(b.shape[0])[:, None]
     unit = (number == number.T)[:, :, None]
 
+    ridged = g + _RIDGE * unit
+
     def solved(at: Array) -> tuple[Array, Array, Array]:
         """The point where so many are held, its inverse, and where they should be."""
         free = at == 0
         held = jnp.where(free, 0.0, jnp.where(at < 0, *ends))
         both = free[:, None] & free
-        inverted = inverse(jnp.where(both, g, unit))
-        x = jnp.where(free, times(inverted, b - times(g, held)), held)
+        inverted = inverse(jnp.where(both, ridged, unit))
+        inverted = jnp.where(both, inverted, 0.0)
+        x = held + times(inverted, b - times(ridged, held))
         # Again, since the inverse of what is nearly singular is not exact.
         for _ in range(_REFINEMENTS):
-            x = x + times(inverted, jnp.where(free, b - times(g, x), 0.0))
-        slope = times(g, x) - b
+            x = x + times(inverted, b - times(ridged, x))
+        slope = times(ridged, x) - b
         slack = _NEGLIGIBLE * jnp.maximum(1.0, jnp.abs(x))
         beyond = (x > ends[1] + slack).astype(at.dtype) - (x < ends[0] - slack)
         leaves = at * slope > _NEGLIGIBLE
-        to = jnp.where(leaves, 0, jnp.where(free, beyond, at))
-        return x, jnp.where(both, inverted, 0.0), to
+        return x, inverted, jnp.where(leaves, 0, jnp.where(free, beyond, at))
+
+    def value(x: Array) -> Array:
+        return jnp.sum((0.5 * times(g, x) - b) * x, axis=0)
 
     def unfinished(carry) -> Array:
         at, to, *_, steps = carry
@@ -75,9 +83,14 @@ def within(
         first = (near >= high).T.astype(jnp.int32) - (near <= low).T
     many = jnp.full(b.shape[1:], b.shape[0] + 1)
     carry = (first, first, b, g, many, jnp.full_like(many, _PATIENCE), 0)
-    at, _, x, inverted, *_ = jax.lax.while_loop(unfinished, exchange, carry)
+    _, _, x, inverted, *_ = jax.lax.while_loop(unfinished, exchange, carry)
+    exact = x = jnp.clip(x, *ends)
+    for _ in range(_REFINEMENTS):
+        exact = exact + times(inverted, b - times(g, exact))
+    exact = jnp.clip(exact, *ends)
+    x = jnp.where(value(exact) <= value(x), exact, x)
+    at_low, at_high = (x <= ends[0]).T, (x >= ends[1]).T
     x, inverted = units.back(x, inverted)
-    at = at.T
-    # Exactly there; and within, where it was beyond by a rounding.
-    x = jnp.where(at < 0, low, jnp.where(at > 0, high, jnp.clip(x, low, high)))
+    # Exactly there; and within, where rounding has moved it beyond.
+    x = jnp.where(at_low, low, jnp.where(at_high, high, jnp.clip(x, low, high)))
     return x, inverted
