@@ -207,9 +207,9 @@ def test_fit_is_many_times_faster_than_all_parameters_at_once(tie, parameters, l
     assert float(best.cost) <= float(best_of_four.cost) * (1 + SAME_COST)
     for _, answer in theirs.values():
         assert abs(2 * answer.cost / float(best.cost) - 1) < SAME_COST
-    # 70 to 220 times, by machine, of the smaller problem.
-    assert theirs["exact"][0] >= 150 * single
-    assert theirs["sparse"][0] >= 8 * single
+    # 290 and 17 times, of the smaller problem; other machines differ by a factor of two.
+    assert theirs["exact"][0] >= 100 * single
+    assert theirs["sparse"][0] >= 6 * single
 
 
 SIZES = ((8192, 3), (16384, 3), (8192, 31), (65536, 3))
