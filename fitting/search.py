@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -69,25 +70,22 @@ def _search_one(
     count = max(1, options.starts) if p.unknowns.n_shape else 1
     points, x = starts.best_starts(p, count)
     begin = [*zip(points, x, strict=True), *([also] if also else [])]
-    return _best(p, _each(p, begin, then=_pulled_back))
+    return _best(p, _each(_pulled_back, p, begin))
 
 
 def _each(
+    descend: Callable[[Problem, ArrayLike, ArrayLike], Solution],
     p: Problem,
     begin: Sequence[tuple[ArrayLike, ArrayLike]],
-    then: Callable[[Problem, Solution], Solution] = lambda _, end: end,
 ) -> list[Solution]:
     """Where starts end, the first by itself: what it compiles, the others use."""
 
-    def job(u: ArrayLike, x: ArrayLike) -> Callable[[], Solution]:
-        def run() -> Solution:
-            # Threads do not inherit it.
-            with jax.enable_x64(True):
-                return then(p, refined(p, u, x))
+    def run(u: ArrayLike, x: ArrayLike) -> Solution:
+        # Threads do not inherit it.
+        with jax.enable_x64(True):
+            return descend(p, u, x)
 
-        return run
-
-    first, *others = [job(*start) for start in begin]
+    first, *others = [functools.partial(run, *start) for start in begin]
     return [first(), *side_by_side(others, p.target.size)]
 
 
@@ -96,8 +94,9 @@ def refined(p: Problem, u: ArrayLike, x: ArrayLike) -> Solution:
     return jax.device_get(refine(p, *jax.device_put((u, x))))
 
 
-def _pulled_back(p: Problem, end: Solution) -> Solution:
-    """Once more from inside, if shape parameters ended at their bounds."""
+def _pulled_back(p: Problem, u: ArrayLike, x: ArrayLike) -> Solution:
+    """The same, and once more from inside if shape parameters ended at their bounds."""
+    end = refined(p, u, x)
     for _ in range(_PULLS):
         u = np.asarray(end.u)
         stuck = is_flat(p.unknowns.scales, u)
@@ -121,7 +120,7 @@ def again(
     """Refit with other residuals, from every end: the order of the minima may change."""
     out: list[Found] = []
     for p, before in zip(problems(rows, model, options, **kwargs), found, strict=True):
-        out.append(_best(p, _each(p, [(e.u, e.x) for e in before.ends])))
+        out.append(_best(p, _each(refined, p, [(e.u, e.x) for e in before.ends])))
     return out
 
 

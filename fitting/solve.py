@@ -67,8 +67,8 @@ def scan(
 
     # Loops leave other cores idle, and may not write all basis functions at once.
     size = candidates.shape[0] * problem.kappa.size * max(1, row_sums.n_basis(problem))
-    alike = len(problem.linear_weight) == 1 and not unknowns.spectral
-    each = jax.vmap(moments) if alike and size <= _MANY else partial(jax.lax.map, moments)
+    at_once = row_sums.alike(problem) and size <= _MANY
+    each = jax.vmap(moments) if at_once else partial(jax.lax.map, moments)
     curvature, slope, cost = each(candidates)
     finite = jnp.isfinite(cost)
     if m:

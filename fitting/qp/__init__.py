@@ -9,8 +9,8 @@ elimination of the coefficients needs next.
 linear constraints, needs twenty.
 """
 
-from fitting.qp.interior_points import QPSolution, solve
+from fitting.qp.interior_points import solve
 from fitting.qp.linear import inverse, product
 from fitting.qp.pivoting import within
 
-__all__ = ("QPSolution", "inverse", "product", "solve", "within")
+__all__ = ("inverse", "product", "solve", "within")

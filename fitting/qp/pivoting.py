@@ -37,7 +37,6 @@ def within(
     ends = jnp.stack([low.T, high.T]) * units.roots / units.size
     number = jnp.arange(b.shape[0])[:, None]
     unit = (number == number.T)[:, :, None]
-
     ridged = g + _RIDGE * unit
 
     def solved(at: Array) -> tuple[Array, Array, Array]:

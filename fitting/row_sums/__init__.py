@@ -16,12 +16,14 @@ to the same sums; `over_rows` takes the first that does:
 from fitting.row_sums.features import dependents, n_basis
 from fitting.row_sums.passes import by_function, linear_moments, of_functions, over_rows
 from fitting.row_sums.reductions import FAST, add_up
+from fitting.row_sums.rows import alike
 from fitting.row_sums.sums import Sums
 
 __all__ = (
     "FAST",
     "Sums",
     "add_up",
+    "alike",
     "by_function",
     "dependents",
     "linear_moments",

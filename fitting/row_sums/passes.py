@@ -13,7 +13,15 @@ from jaxtyping import Array
 from fitting.row_sums import reductions
 from fitting.row_sums.features import basis, features, inlinable
 from fitting.row_sums.products import contracted, half_gram, moments, weighted
-from fitting.row_sums.rows import Data, cut, data_of, geometry_of, residual, sum_blocks
+from fitting.row_sums.rows import (
+    Data,
+    alike,
+    cut,
+    data_of,
+    geometry_of,
+    residual,
+    sum_blocks,
+)
 from fitting.row_sums.sums import Sums, symmetric
 
 if TYPE_CHECKING:
@@ -105,12 +113,12 @@ def linear_moments(problem: Problem, u: Array) -> tuple[Array, Array, Array]:
         f = basis(problem, u, lambda s: problem.model.basis(s, geometry))
         weight = cut(problem, problem.linear_weight, first)
         value = cut(problem, problem.linear_target, first)
-        if reductions.few_moments(problem, f):
+        if reductions.few_moments(problem):
             return reductions.moments(f, weight[0], value)
         heavy = weight * weight
-        alike = f.ndim == 2 and len(weight) == 1
+        shared = alike(problem)
         return (
-            reductions.half_gram(f, weight[0]) if alike else half_gram(f, heavy),
+            reductions.half_gram(f, weight[0]) if shared else half_gram(f, heavy),
             moments(heavy * value, f),
             jnp.sum(heavy * value * value),
         )

@@ -12,9 +12,10 @@ import numpy as np
 from jaxtyping import Array
 
 from fitting.geometry import Geometry
-from fitting.row_sums.features import listed, number
+from fitting.row_sums.features import listed, n_basis, number
 from fitting.row_sums.rows import (
     Data,
+    alike,
     cut,
     data_of,
     geometry_of,
@@ -154,13 +155,11 @@ def _products(features: Iterable[Array], slope: Array) -> list[Array]:
     return [steep[i] * steep[j] for i, j in zip(*pairs(len(steep)), strict=True)]
 
 
-def few_moments(problem: Problem, basis: Array) -> bool:
+def few_moments(problem: Problem) -> bool:
     """Whether what `moments` adds up is not too much for one loop."""
-    channels, own = problem.linear_target.shape[0], problem.linear_weight.shape[0]
-    most, count = _most(problem), basis.shape[0]
-    if basis.ndim > 2 or own > 1 or channels > most.inlined:
-        return False
-    return count * (count + 1) // 2 + channels * (count + 1) <= most.sums
+    channels, count, most = problem.target.shape[0], n_basis(problem), _most(problem)
+    sums = count * (count + 1) // 2 + channels * (count + 1)
+    return alike(problem) and channels <= most.inlined and sums <= most.sums
 
 
 def moments(basis: Array, weight: Array, value: Array) -> tuple[Array, Array, Array]:

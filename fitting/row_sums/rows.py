@@ -51,6 +51,12 @@ def slope_is_shared(problem: Problem) -> bool:
     return linear and not problem.robust and problem.weight.shape[0] == 1
 
 
+def alike(problem: Problem) -> bool:
+    """Whether channels share basis functions and the weights of the residual linearised at
+    the data."""
+    return len(problem.linear_weight) == 1 and not problem.unknowns.spectral
+
+
 def cut(problem: Problem, array: Array, first: Array | int) -> Array:
     """The rows of a block, which are last in an array."""
     if array.shape[-1] == problem.chunk:
